@@ -1,0 +1,141 @@
+#include "protocol/param.h"
+#include "protocol/technique_info.h"
+#include <assert.h>
+#include <errno.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static void store(const struct pen_param *row, void *object, uint32_t i, double value)
+{
+    char *at = (char *)object + row->offset + 4 * i;
+    float f;
+    int32_t s;
+    uint32_t u;
+    switch (row->type) {
+    case PEN_PARAM_FLOAT:
+        f = (float)value;
+        memcpy(at, &f, 4);
+        break;
+    case PEN_PARAM_INT:
+        s = (int32_t)value;
+        memcpy(at, &s, 4);
+        break;
+    default:
+        u = (uint32_t)value;
+        memcpy(at, &u, 4);
+    }
+}
+
+double pen_param_load(const struct pen_param *row, const void *object, uint32_t i)
+{
+    const char *at = (const char *)object + row->offset + 4 * i;
+    float f;
+    int32_t s;
+    uint32_t u;
+    switch (row->type) {
+    case PEN_PARAM_FLOAT:
+        memcpy(&f, at, 4);
+        return f;
+    case PEN_PARAM_INT:
+        memcpy(&s, at, 4);
+        return s;
+    default:
+        memcpy(&u, at, 4);
+        return u;
+    }
+}
+
+void pen_params_default(struct pen_param_table table, void *object)
+{
+    for (uint32_t r = 0; r < table.count; r++)
+        for (uint32_t i = 0; i < table.rows[r].count; i++)
+            store(&table.rows[r], object, i, table.rows[r].def_v[i]);
+}
+
+const struct pen_param *pen_param_find(struct pen_param_table table, const char *name)
+{
+    for (uint32_t r = 0; r < table.count; r++)
+        if (!strcmp(table.rows[r].name, name))
+            return &table.rows[r];
+    return NULL;
+}
+
+bool pen_param_store(const struct pen_param *row, void *object, const double *values,
+    const char *pointer, struct pen_error *error)
+{
+    double min = row->min, max = row->max;
+    if (row->type == PEN_PARAM_FLAG)
+        min = 0, max = 1;
+    if (row->choices) {
+        min = max = 0;
+        while (row->choices[(int)max + 1])
+            max++;
+    }
+    for (uint32_t i = 0; i < row->count; i++) {
+        double v = values[i];
+        if (!isfinite(v))
+            return pen_fail(
+                error, PEN_UNPROCESSABLE, pointer, "%s must be a finite number.", row->name);
+        if (row->type != PEN_PARAM_FLOAT && v != floor(v))
+            return pen_fail(
+                error, PEN_UNPROCESSABLE, pointer, "%s must be a whole number.", row->name);
+        if (v < min || v > max || (row->exclusive_min && v <= min))
+            return pen_fail(error, PEN_UNPROCESSABLE, pointer, "%s is %g, but must lie in %c%g, %g].",
+                row->name, v, row->exclusive_min ? '(' : '[', min, max);
+    }
+    for (uint32_t i = 0; i < row->count; i++)
+        store(row, object, i, values[i]);
+    return true;
+}
+
+bool pen_param_parse(const struct pen_param *row, void *object, const char *text,
+    const char *pointer, struct pen_error *error)
+{
+    double values[4] = {0};
+    if (row->choices) {
+        int index = pen_choice_index(row->choices, text);
+        if (index < 0)
+            return pen_fail(error, PEN_UNPROCESSABLE, pointer, "%s has no choice called \"%.40s\".",
+                row->name, text);
+        values[0] = index;
+    } else if (row->type == PEN_PARAM_FLAG) {
+        if (!strcmp(text, "1") || !strcmp(text, "on") || !strcmp(text, "true"))
+            values[0] = 1;
+        else if (strcmp(text, "0") && strcmp(text, "off") && strcmp(text, "false"))
+            return pen_fail(
+                error, PEN_UNPROCESSABLE, pointer, "%s must be true or false.", row->name);
+    } else {
+        const char *at = text;
+        for (uint32_t i = 0; i < row->count; i++) {
+            char *end;
+            errno = 0;
+            values[i] = strtod(at, &end);
+            bool last = i + 1 == row->count;
+            /* strtod also takes hexadecimal floats and leading space: neither is a number here. */
+            if (end == at || *end != (last ? '\0' : ',') || strspn(at, "+-.0123456789eE") <
+                    (size_t)(end - at))
+                return pen_fail(error, PEN_UNPROCESSABLE, pointer, "%s must be %u number%s.",
+                    row->name, row->count, row->count > 1 ? "s separated by commas" : "");
+            at = end + 1;
+        }
+    }
+    return pen_param_store(row, object, values, pointer, error);
+}
+
+int pen_choice_index(const char *const *choices, const char *name)
+{
+    for (int i = 0; choices[i]; i++)
+        if (!strcmp(choices[i], name))
+            return i;
+    return -1;
+}
+
+const struct pen_technique_info *pen_catalogue_find(
+    const struct pen_catalogue *catalogue, const char *name)
+{
+    for (uint32_t i = 0; i < catalogue->count; i++)
+        if (!strcmp(catalogue->items[i]->name, name))
+            return catalogue->items[i];
+    return NULL;
+}

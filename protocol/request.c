@@ -1,0 +1,284 @@
+#include "protocol/request.h"
+#include "protocol/technique_info.h"
+#include <math.h>
+#include <string.h>
+
+const char *const pen_light_type_names[] = {"rect", "disk", "sphere", "sun", "point", "spot", NULL};
+const char *const pen_layer_names[] = {
+    "beauty", "visibility", "penumbra", "depth", "normal", "albedo", "position", "all", NULL};
+const char *const pen_format_names[] = {"png", "exr", "jpeg", "webp", "tiff", NULL};
+const char *const pen_format_mime[] = {
+    "image/png", "image/x-exr", "image/jpeg", "image/webp", "image/tiff", NULL};
+const char *const pen_tone_map_names[] = {"none", "reinhard", "aces", NULL};
+const char *const pen_priority_names[] = {"interactive", "batch", NULL};
+const char *const pen_pattern_names[] = {
+    "two-colour", "checker", "stained-glass", "star", "candle-flame", NULL};
+
+#define FAR 1e6 /* m: single precision still resolves 6 cm there */
+
+#define REQUEST(field, ...) PARAM(struct pen_request, field, __VA_ARGS__)
+static const struct pen_param request_rows[] = {
+    REQUEST(width, .def = 800, .min = 1, .max = PEN_MAX_IMAGE_SIDE, .unit = "px",
+        .help = "Image width."),
+    REQUEST(height, .def = 600, .min = 1, .max = PEN_MAX_IMAGE_SIDE, .unit = "px",
+        .help = "Image height."),
+    REQUEST(ground, .def = 1, .help = "Puts a receiver under the scene's bounds."),
+    REQUEST(ground_albedo, .def_v = {0.5, 0.5, 0.5}, .max = 1,
+        .help = "Diffuse albedo of the ground, linear RGB."),
+    REQUEST(ambient, .def_v = {0.02, 0.02, 0.02}, .max = 1e4, .unit = "W m^-2 sr^-1",
+        .help = "Uniform ambient radiance, linear RGB."),
+    REQUEST(background, .def_v = {0.05, 0.05, 0.06}, .max = 1e4, .unit = "W m^-2 sr^-1",
+        .help = "Radiance where no surface is hit, linear RGB."),
+    REQUEST(exposure_ev, .def = 0, .min = -20, .max = 20, .unit = "stops",
+        .help = "Multiplies the image by two to this power."),
+    REQUEST(tone_map, .def = PEN_TONE_NONE, .choices = pen_tone_map_names,
+        .help = "Curve between radiance and the display; none clips at 1."),
+    REQUEST(antialias, .def = 1, .min = 1, .max = PEN_MAX_ANTIALIAS, .unit = "frames",
+        .help = "Jittered frames averaged into the image."),
+    REQUEST(classify, .def = 0,
+        .help = "Skips pixels that a min-max pyramid proves lit or in umbra, where the method can."),
+    REQUEST(time_s, .def = 0, .min = 0, .max = 1e6, .unit = "s",
+        .help = "Time at which animated emission is shown."),
+};
+
+#define CAMERA(field, ...) PARAM(struct pen_camera, field, __VA_ARGS__)
+static const struct pen_param camera_rows[] = {
+    CAMERA(index, .def = 0, .min = 0, .max = 65535, .help = "Camera of the scene, from 0."),
+    CAMERA(eye, .def_v = {0, 0, 1}, .min = -FAR, .max = FAR, .unit = "m",
+        .help = "Position of the eye, world space."),
+    CAMERA(target, .def_v = {0, 0, 0}, .min = -FAR, .max = FAR, .unit = "m",
+        .help = "Point at the centre of the image, world space."),
+    CAMERA(up, .def_v = {0, 1, 0}, .min = -1, .max = 1, .help = "Direction that is up in the image."),
+    CAMERA(fov_y_deg, .def = 45, .min = 1, .max = 170, .unit = "deg",
+        .help = "Vertical field of view."),
+    CAMERA(azimuth_deg, .def = 35, .min = -3600, .max = 3600, .unit = "deg",
+        .help = "Orbit: angle around +y, from +z towards +x."),
+    CAMERA(elevation_deg, .def = 25, .min = -89.9, .max = 89.9, .unit = "deg",
+        .help = "Orbit: angle above the horizon."),
+    CAMERA(distance, .def = 0, .min = 0, .max = FAR, .unit = "m",
+        .help = "Orbit: distance from the centre of the bounds; 0 frames them."),
+};
+
+#define AREA (PEN_LIGHT_BIT(PEN_LIGHT_RECT) | PEN_LIGHT_BIT(PEN_LIGHT_DISK))
+#define ROUND (PEN_LIGHT_BIT(PEN_LIGHT_DISK) | PEN_LIGHT_BIT(PEN_LIGHT_SPHERE))
+#define EMITTER (AREA | PEN_LIGHT_BIT(PEN_LIGHT_SPHERE))
+#define PUNCTUAL (PEN_LIGHT_BIT(PEN_LIGHT_POINT) | PEN_LIGHT_BIT(PEN_LIGHT_SPOT))
+#define LIGHT(field, ...) PARAM(struct pen_light, field, __VA_ARGS__)
+static const struct pen_param light_rows[] = {
+    LIGHT(position, .def_v = {0, 3, 0}, .min = -FAR, .max = FAR, .unit = "m",
+        .help = "Centre of the emitter, world space; for a sun only the direction counts."),
+    LIGHT(target, .def_v = {0, 0, 0}, .min = -FAR, .max = FAR, .unit = "m",
+        .help = "Point that the emitter faces, world space."),
+    LIGHT(up, .def_v = {0, 1, 0}, .min = -1, .max = 1,
+        .help = "Orients the emitter: its +y axis is the part of this vector across its axis."),
+    LIGHT(width, .def = 1, .min = 0, .max = 1e4, .exclusive_min = 1, .unit = "m",
+        .applies = PEN_LIGHT_BIT(PEN_LIGHT_RECT), .help = "Extent along the emitter's x axis."),
+    LIGHT(height, .def = 1, .min = 0, .max = 1e4, .exclusive_min = 1, .unit = "m",
+        .applies = PEN_LIGHT_BIT(PEN_LIGHT_RECT), .help = "Extent along the emitter's y axis."),
+    LIGHT(radius, .def = 0.5, .min = 0, .max = 1e4, .exclusive_min = 1, .unit = "m",
+        .applies = ROUND, .help = "Radius of the disk or sphere."),
+    LIGHT(angular_diameter_deg, .def = 0.53, .min = 0, .max = 60, .unit = "deg",
+        .applies = PEN_LIGHT_BIT(PEN_LIGHT_SUN), .help = "Apparent diameter of the sun."),
+    LIGHT(inner_cone_deg, .def = 0, .min = 0, .max = 89, .unit = "deg",
+        .applies = PEN_LIGHT_BIT(PEN_LIGHT_SPOT), .help = "Half angle of full intensity."),
+    LIGHT(outer_cone_deg, .def = 45, .min = 0, .max = 89, .exclusive_min = 1, .unit = "deg",
+        .applies = PEN_LIGHT_BIT(PEN_LIGHT_SPOT), .help = "Half angle where intensity reaches zero."),
+    LIGHT(color, .def_v = {1, 1, 1}, .max = 1e3, .help = "Linear RGB factor of the emission."),
+    LIGHT(power_w, .def = 100, .min = 0, .max = 1e9, .unit = "W", .applies = EMITTER | PUNCTUAL,
+        .help = "Radiant flux; 0 uses radiance instead."),
+    LIGHT(radiance, .def = 0, .min = 0, .max = 1e9, .unit = "W m^-2 sr^-1", .applies = EMITTER,
+        .help = "Emitted radiance, when power_w is 0."),
+    LIGHT(irradiance, .def = 3, .min = 0, .max = 1e9, .unit = "W m^-2",
+        .applies = PEN_LIGHT_BIT(PEN_LIGHT_SUN), .help = "On a surface that faces the sun."),
+};
+
+#define OUTPUT(field, ...) PARAM(struct pen_output, field, __VA_ARGS__)
+static const struct pen_param output_rows[] = {
+    OUTPUT(format, .def = PEN_PNG, .choices = pen_format_names, .help = "File format."),
+    OUTPUT(layer, .def = PEN_LAYER_BEAUTY, .choices = pen_layer_names,
+        .help = "What the image shows; all: every layer in one EXR."),
+    OUTPUT(bit_depth, .def = 0, .min = 0, .max = 32, .unit = "bit",
+        .help = "8 or 16 for PNG and TIFF, 16 or 32 for EXR; 0: 8, or 16 for EXR."),
+    OUTPUT(quality, .def = 92, .min = 1, .max = 100, .help = "JPEG and WebP quality."),
+};
+
+#define DELIVERY(field, ...) PARAM(struct pen_delivery, field, __VA_ARGS__)
+static const struct pen_param delivery_rows[] = {
+    DELIVERY(deadline_ms, .def = 30000, .min = 1, .max = 3600000, .unit = "ms",
+        .help = "The answer is 504 when it is not ready by then."),
+    DELIVERY(priority, .def = PEN_PRIORITY_INTERACTIVE, .choices = pen_priority_names,
+        .help = "Interactive requests are taken first."),
+};
+
+struct pen_param_table pen_request_table(void)
+{
+    return PEN_TABLE(request_rows);
+}
+
+struct pen_param_table pen_camera_table(void)
+{
+    return PEN_TABLE(camera_rows);
+}
+
+struct pen_param_table pen_light_table(void)
+{
+    return PEN_TABLE(light_rows);
+}
+
+struct pen_param_table pen_output_table(void)
+{
+    return PEN_TABLE(output_rows);
+}
+
+struct pen_param_table pen_delivery_table(void)
+{
+    return PEN_TABLE(delivery_rows);
+}
+
+void pen_light_default(struct pen_light *light, enum pen_light_type type)
+{
+    memset(light, 0, sizeof *light);
+    pen_params_default(pen_light_table(), light);
+    light->type = type;
+}
+
+void pen_request_default(struct pen_request *request, const struct pen_catalogue *catalogue)
+{
+    memset(request, 0, sizeof *request);
+    pen_params_default(pen_request_table(), request);
+    pen_params_default(pen_camera_table(), &request->camera);
+    pen_params_default(pen_output_table(), &request->output);
+    pen_params_default(pen_delivery_table(), &request->delivery);
+    const struct pen_technique_info *info = pen_catalogue_find(catalogue, "pcss");
+    if (!info && catalogue->count)
+        info = catalogue->items[0];
+    if (info) {
+        strncpy(request->technique, info->name, sizeof request->technique - 1);
+        pen_params_default(info->params, request->technique_params);
+    }
+}
+
+static float length3(const float v[3])
+{
+    return sqrtf(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+}
+
+/* An axis and an up vector that is not (nearly) parallel to it. */
+static bool is_frame(const float from[3], const float to[3], const float up[3], bool need_up)
+{
+    float axis[3] = {to[0] - from[0], to[1] - from[1], to[2] - from[2]};
+    float length = length3(axis);
+    if (!(length > 1e-6f))
+        return false;
+    return !need_up || length3(up) > 1e-3f;
+}
+
+static bool check_rows(struct pen_param_table table, const void *object, uint32_t light_bit,
+    const char *pointer, struct pen_error *error)
+{
+    for (uint32_t r = 0; r < table.count; r++) {
+        const struct pen_param *row = &table.rows[r];
+        if (row->applies && light_bit && !(row->applies & light_bit))
+            continue;
+        double values[4];
+        uint32_t scratch[128]; /* only the range check is wanted, not the store */
+        struct pen_param flat = *row;
+        flat.offset = 0;
+        for (uint32_t i = 0; i < row->count; i++)
+            values[i] = pen_param_load(row, object, i);
+        if (!pen_param_store(&flat, scratch, values, pointer, error))
+            return false;
+    }
+    return true;
+}
+
+bool pen_request_check(const struct pen_request *request, const struct pen_catalogue *catalogue,
+    struct pen_error *error)
+{
+    if (memchr(request->technique, 0, sizeof request->technique) == NULL)
+        return pen_fail(error, PEN_UNPROCESSABLE, "/technique/name", "The method has no valid name.");
+    const struct pen_technique_info *info = pen_catalogue_find(catalogue, request->technique);
+    if (!info)
+        return pen_fail(error, PEN_UNPROCESSABLE, "/technique/name",
+            "There is no method called \"%s\".", request->technique);
+    if (!check_rows(info->params, request->technique_params, 0, "/technique/params", error) ||
+        !check_rows(pen_request_table(), request, 0, "", error) ||
+        !check_rows(pen_camera_table(), &request->camera, 0, "/camera", error) ||
+        !check_rows(pen_output_table(), &request->output, 0, "/output", error) ||
+        !check_rows(pen_delivery_table(), &request->delivery, 0, "", error))
+        return false;
+    if ((uint64_t)request->width * request->height > PEN_MAX_IMAGE_PIXELS)
+        return pen_fail(error, PEN_UNPROCESSABLE, "/width",
+            "%u x %u is more than the %u pixels that one image may have.", request->width,
+            request->height, PEN_MAX_IMAGE_PIXELS);
+    const struct pen_camera *camera = &request->camera;
+    if (camera->mode > PEN_CAMERA_ORBIT)
+        return pen_fail(error, PEN_UNPROCESSABLE, "/camera", "Unknown camera mode.");
+    if (camera->mode == PEN_CAMERA_LOOK_AT &&
+        !is_frame(camera->eye, camera->target, camera->up, true))
+        return pen_fail(error, PEN_UNPROCESSABLE, "/camera",
+            "The camera needs an eye and a target that differ, and an up vector that is not zero.");
+    if (request->light_count > PEN_MAX_LIGHTS)
+        return pen_fail(error, PEN_UNPROCESSABLE, "/lights", "At most %d lights are allowed.",
+            PEN_MAX_LIGHTS);
+    for (uint32_t i = 0; i < request->light_count; i++) {
+        const struct pen_light *light = &request->lights[i];
+        char pointer[32] = "/lights/0";
+        pointer[8] = (char)('0' + i);
+        if (light->type >= PEN_LIGHT_TYPES)
+            return pen_fail(error, PEN_UNPROCESSABLE, pointer, "Unknown light type.");
+        if (!check_rows(pen_light_table(), light, PEN_LIGHT_BIT(light->type), pointer, error))
+            return false;
+        bool round = light->type == PEN_LIGHT_POINT || light->type == PEN_LIGHT_SPHERE;
+        if (!round && !is_frame(light->position, light->target, light->up, true))
+            return pen_fail(error, PEN_UNPROCESSABLE, pointer,
+                "The light needs a position and a target that differ, and an up vector.");
+        if (light->type == PEN_LIGHT_SPOT && light->inner_cone_deg >= light->outer_cone_deg)
+            return pen_fail(error, PEN_UNPROCESSABLE, pointer,
+                "inner_cone_deg must be smaller than outer_cone_deg.");
+        if (light->texture > PEN_TEXTURE_PATTERN || (light->texture == PEN_TEXTURE_PATTERN &&
+                light->pattern >= sizeof pen_pattern_names / sizeof *pen_pattern_names - 1))
+            return pen_fail(error, PEN_UNPROCESSABLE, pointer, "Unknown emission pattern.");
+        if (light->texture && light->type != PEN_LIGHT_RECT)
+            return pen_fail(error, PEN_UNPROCESSABLE, pointer,
+                "Only rect lights take an emission texture.");
+    }
+    const struct pen_output *output = &request->output;
+    uint32_t bits = output->bit_depth;
+    bool depth_ok = bits == 0 || (bits == 8 && output->format != PEN_EXR) ||
+        (bits == 16 && output->format != PEN_JPEG && output->format != PEN_WEBP) ||
+        (bits == 32 && output->format == PEN_EXR);
+    if (!depth_ok)
+        return pen_fail(error, PEN_UNPROCESSABLE, "/output/bit_depth",
+            "%s cannot have %u bits per channel.", pen_format_names[output->format], bits);
+    if (output->layer == PEN_LAYER_ALL && output->format != PEN_EXR)
+        return pen_fail(error, PEN_UNPROCESSABLE, "/output/layer",
+            "All layers in one file need the exr format.");
+    return true;
+}
+
+void pen_id_to_hex(const uint8_t id[PEN_ID_BYTES], char text[PEN_ID_HEX + 1])
+{
+    static const char digits[] = "0123456789abcdef";
+    for (int i = 0; i < PEN_ID_BYTES; i++) {
+        text[2 * i] = digits[id[i] >> 4];
+        text[2 * i + 1] = digits[id[i] & 15];
+    }
+    text[PEN_ID_HEX] = 0;
+}
+
+bool pen_id_from_hex(const char *text, uint8_t id[PEN_ID_BYTES])
+{
+    for (int i = 0; i < PEN_ID_HEX; i++) {
+        char c = text[i];
+        uint8_t nibble;
+        if (c >= '0' && c <= '9')
+            nibble = (uint8_t)(c - '0');
+        else if (c >= 'a' && c <= 'f')
+            nibble = (uint8_t)(c - 'a' + 10);
+        else
+            return false;
+        id[i / 2] = (uint8_t)(i % 2 ? id[i / 2] | nibble : nibble << 4);
+    }
+    return text[PEN_ID_HEX] == 0;
+}

@@ -1,0 +1,137 @@
+/* A render request as one plain struct. It has no pointers and no padding: it crosses processes as
+ * it is, its bytes up to `delivery` are the cache key, and it is echoed back completed. */
+#pragma once
+#include "protocol/limits.h"
+#include "protocol/param.h"
+
+enum pen_light_type {
+    PEN_LIGHT_RECT,   /* one-sided rectangle, emits along position -> target */
+    PEN_LIGHT_DISK,   /* one-sided disk */
+    PEN_LIGHT_SPHERE, /* treated as a disk that faces the receivers */
+    PEN_LIGHT_SUN,    /* parallel light of an angular diameter; direction is position -> target */
+    PEN_LIGHT_POINT,
+    PEN_LIGHT_SPOT,
+    PEN_LIGHT_TYPES
+};
+#define PEN_LIGHT_BIT(t) (1u << (t))
+
+enum pen_light_texture { PEN_TEXTURE_NONE, PEN_TEXTURE_IMAGE, PEN_TEXTURE_PATTERN };
+
+struct pen_light {
+    uint32_t type;      /* enum pen_light_type */
+    float position[3];  /* m, world; the centre of the emitter (sun: only the direction counts) */
+    float target[3];    /* m, world */
+    float up[3];        /* the emitter's +y is the part of `up` across its axis */
+    float width;        /* m */
+    float height;       /* m */
+    float radius;       /* m */
+    float angular_diameter_deg;
+    float inner_cone_deg; /* half angles, as in KHR_lights_punctual */
+    float outer_cone_deg;
+    float color[3];     /* linear RGB factor */
+    float power_w;      /* radiant flux, W; 0: use radiance / irradiance */
+    float radiance;     /* W m^-2 sr^-1 */
+    float irradiance;   /* sun: W m^-2 on a surface that faces it */
+    uint32_t texture;   /* enum pen_light_texture */
+    uint32_t pattern;   /* index into pen_pattern_names when texture is PEN_TEXTURE_PATTERN */
+    uint8_t image[PEN_ID_BYTES]; /* emission image when texture is PEN_TEXTURE_IMAGE */
+};
+
+enum pen_camera_mode { PEN_CAMERA_AUTO, PEN_CAMERA_LOOK_AT, PEN_CAMERA_INDEX, PEN_CAMERA_ORBIT };
+
+struct pen_camera {
+    uint32_t mode;     /* enum pen_camera_mode */
+    uint32_t index;    /* of the scene's cameras */
+    float eye[3];      /* m, world */
+    float target[3];   /* m, world */
+    float up[3];
+    float fov_y_deg;
+    float azimuth_deg; /* orbit: from +z towards +x, around the centre of the bounds */
+    float elevation_deg;
+    float distance;    /* m; 0: frames the bounds */
+};
+
+enum pen_layer {
+    PEN_LAYER_BEAUTY,
+    PEN_LAYER_VISIBILITY, /* mean over lights: rgb = coloured visibility, a = mean visibility */
+    PEN_LAYER_PENUMBRA,   /* classifier: 0 lit, 1 penumbra, 2 umbra */
+    PEN_LAYER_DEPTH,      /* distance along the view axis, m */
+    PEN_LAYER_NORMAL,     /* world-space shading normal */
+    PEN_LAYER_ALBEDO,
+    PEN_LAYER_POSITION,   /* world, m */
+    PEN_LAYER_ALL,        /* EXR only: all of the above in one file */
+    PEN_LAYERS
+};
+enum pen_format { PEN_PNG, PEN_EXR, PEN_JPEG, PEN_WEBP, PEN_TIFF, PEN_FORMATS };
+enum pen_tone_map { PEN_TONE_NONE, PEN_TONE_REINHARD, PEN_TONE_ACES, PEN_TONE_MAPS };
+enum pen_weighting { PEN_WEIGHT_AREA, PEN_WEIGHT_G };
+enum pen_priority { PEN_PRIORITY_INTERACTIVE, PEN_PRIORITY_BATCH };
+
+struct pen_output {
+    uint32_t format;    /* enum pen_format */
+    uint32_t layer;     /* enum pen_layer */
+    uint32_t bit_depth; /* 8, 16 (PNG, TIFF; EXR half), 32 (EXR float); 0: the format's default */
+    uint32_t quality;   /* 1 to 100, JPEG and lossy WebP */
+};
+
+struct pen_delivery { /* how the answer is wanted; no pixel depends on it */
+    uint32_t deadline_ms;
+    uint32_t priority; /* enum pen_priority */
+};
+
+struct pen_request {
+    uint8_t scene[PEN_ID_BYTES];
+    char technique[PEN_TECHNIQUE_NAME_BYTES]; /* zero-padded */
+    uint32_t technique_params[PEN_TECHNIQUE_PARAM_BYTES / 4]; /* the method's own struct */
+    uint32_t width, height; /* px */
+    struct pen_camera camera;
+    uint32_t lights_given; /* 0: the scene's own, else one that suits the bounds */
+    uint32_t light_count;
+    struct pen_light lights[PEN_MAX_LIGHTS];
+    pen_flag ground;       /* a receiver under the bounds */
+    float ground_albedo[3];
+    float ambient[3];      /* W m^-2 sr^-1, uniform */
+    float background[3];   /* W m^-2 sr^-1 where nothing is hit */
+    float exposure_ev;     /* stops */
+    uint32_t tone_map;     /* enum pen_tone_map */
+    uint32_t antialias;    /* jittered frames per image */
+    pen_flag classify;     /* skip pixels whose answer the min-max pyramid already proves */
+    float time_s;          /* selects the frame of animated emission */
+    struct pen_output output;
+    struct pen_delivery delivery; /* must stay last: see PEN_REQUEST_KEY_BYTES */
+};
+#define PEN_REQUEST_KEY_BYTES offsetof(struct pen_request, delivery)
+
+extern const char *const pen_light_type_names[];
+extern const char *const pen_layer_names[];
+extern const char *const pen_format_names[];
+extern const char *const pen_format_mime[];
+extern const char *const pen_tone_map_names[];
+extern const char *const pen_priority_names[];
+extern const char *const pen_pattern_names[]; /* built-in emission patterns */
+
+/* Rows of struct pen_request, pen_camera, pen_light, pen_output and pen_delivery.
+ * The object-valued keys (technique, camera, lights, output) are handled by the documents. */
+struct pen_param_table pen_request_table(void);  /* base: struct pen_request */
+struct pen_param_table pen_camera_table(void);   /* base: struct pen_camera */
+struct pen_param_table pen_light_table(void);    /* base: struct pen_light; see pen_param.applies */
+struct pen_param_table pen_output_table(void);   /* base: struct pen_output */
+struct pen_param_table pen_delivery_table(void); /* base: struct pen_delivery */
+
+/* Fills *request with every default (also a zeroed scene id, the first technique of the catalogue
+ * that is called "pcss", else the first). */
+struct pen_catalogue;
+void pen_request_default(struct pen_request *request, const struct pen_catalogue *catalogue);
+/* Every default of one light of `type`. */
+void pen_light_default(struct pen_light *light, enum pen_light_type type);
+
+/* Checks what no single row can: pixel budget, layer against format, light against emitter size,
+ * degenerate camera, known technique. Errors: PEN_UNPROCESSABLE with a pointer. A worker calls it
+ * too: it trusts no message. */
+struct pen_technique_info;
+bool pen_request_check(const struct pen_request *request, const struct pen_catalogue *catalogue,
+    struct pen_error *error);
+
+/* 64 lower-case hexadecimal digits and back; false when `text` is anything else. */
+void pen_id_to_hex(const uint8_t id[PEN_ID_BYTES], char text[PEN_ID_HEX + 1]);
+bool pen_id_from_hex(const char *text, uint8_t id[PEN_ID_BYTES]);

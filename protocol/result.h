@@ -1,0 +1,50 @@
+/* What comes back with an image: how it was made and what every pass cost. No pointers. */
+#pragma once
+#include "protocol/request.h"
+
+enum pen_stage {
+    PEN_STAGE_QUEUE,
+    PEN_STAGE_LOAD,      /* scene and images into GPU memory */
+    PEN_STAGE_GBUFFER,
+    PEN_STAGE_SHADOW,    /* shadow inputs: depth maps, pyramids, SATs */
+    PEN_STAGE_TECHNIQUE, /* the method's own screen passes */
+    PEN_STAGE_SHADE,
+    PEN_STAGE_READBACK,
+    PEN_STAGE_ENCODE,
+    PEN_STAGES
+};
+extern const char *const pen_stage_names[];
+
+struct pen_pass_time {
+    char name[24];
+    uint32_t stage; /* enum pen_stage */
+    uint32_t count; /* how often it ran for this image */
+    float ms;       /* GPU time (software GL: wall clock between finishes), summed */
+};
+
+struct pen_device_info {
+    char renderer[128]; /* GL_RENDERER */
+    char version[96];   /* GL_VERSION */
+    char platform[32];  /* "egl-device", "egl-surfaceless", "osmesa" */
+    uint32_t software;  /* 1: no GPU behind it */
+};
+
+struct pen_result {
+    struct pen_error error;       /* PEN_OK: there is an image */
+    struct pen_request completed; /* camera and lights resolved, modes LOOK_AT / given */
+    struct pen_device_info device;
+    uint32_t warning_count;
+    char warnings[PEN_MAX_WARNINGS][192];
+    float stage_ms[PEN_STAGES];
+    uint32_t pass_count;
+    struct pen_pass_time passes[PEN_MAX_PASSES];
+    uint32_t scene_was_resident;
+    uint32_t shadow_inputs_reused;
+    uint32_t class_pixels[3];     /* lit, penumbra, umbra; all 0 when not classified */
+    uint32_t full_work_pixels;    /* pixels for which the method ran in full */
+    uint32_t triangles_drawn;
+    uint64_t gpu_bytes;           /* resident scenes, images and shadow inputs */
+    uint64_t image_bytes;         /* encoded size */
+};
+void pen_result_warn(struct pen_result *result, const char *format, ...)
+    __attribute__((format(printf, 2, 3)));

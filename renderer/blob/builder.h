@@ -1,0 +1,54 @@
+/* Builds a scene blob in memory: used by the importer and by the built-in scenes. Not thread-safe;
+ * one builder, one owner. */
+#pragma once
+#include "renderer/blob/pscene.h"
+
+struct psc_builder;
+
+struct psc_builder *psc_builder_create(void); /* aborts on out of memory, like all allocation here */
+void psc_builder_destroy(struct psc_builder *builder);
+
+struct psc_mesh {
+    const float (*positions)[3];
+    const float (*normals)[3];  /* NULL: flat normals are generated (vertices are split) */
+    const float (*tangents)[4]; /* NULL: generated from uv set 0 when `need_tangents` */
+    const float (*uv0)[2];      /* NULL: zero */
+    const float (*uv1)[2];      /* NULL: zero */
+    const float (*colors)[4];   /* NULL: white */
+    uint32_t vertex_count;
+    const uint32_t *indices; /* NULL: 0 .. vertex_count - 1 */
+    uint32_t index_count;    /* a multiple of 3 */
+    uint32_t material;
+    bool need_tangents;
+    /* When not NULL: triangles per meshlet, in order, each at most PSC_MESHLET_TRIANGLES (what an
+     * optimiser found). NULL: consecutive runs. */
+    const uint32_t *meshlet_triangles;
+    uint32_t meshlet_count;
+};
+
+/* Each returns the new item's number. Inputs are copied. */
+uint32_t psc_builder_add_material(struct psc_builder *builder, const struct psc_material *material);
+uint32_t psc_builder_add_texture(struct psc_builder *builder, const struct psc_texture *texture);
+/* RGBA8, top row first; the mip chain is made here (box filter, in linear light when srgb). */
+uint32_t psc_builder_add_image(struct psc_builder *builder, uint32_t width, uint32_t height,
+    bool srgb, const uint8_t *rgba);
+uint32_t psc_builder_add_light(struct psc_builder *builder, const struct psc_light *light);
+uint32_t psc_builder_add_camera(struct psc_builder *builder, const struct psc_camera *camera);
+void psc_builder_add_warning(struct psc_builder *builder, const char *format, ...)
+    __attribute__((format(printf, 2, 3)));
+void psc_builder_set_animations(struct psc_builder *builder, uint32_t count);
+
+/* Adds triangles. Degenerate ones are kept; an index out of range, a non-finite position or more
+ * than 2^31 indices in total fails with PEN_UNPROCESSABLE. */
+bool psc_builder_add_mesh(struct psc_builder *builder, const struct psc_mesh *mesh,
+    uint32_t *primitive, struct pen_error *error);
+/* world: row-major 3x4. */
+void psc_builder_add_instance(
+    struct psc_builder *builder, uint32_t primitive, const float world[12]);
+
+/* A default material: base colour white, roughness 1, metallic 0, no textures. */
+struct psc_material psc_material_default(void);
+
+/* The finished file. The caller frees *data. */
+bool psc_builder_finish(struct psc_builder *builder, const uint8_t source[PEN_ID_BYTES], void **data,
+    size_t *bytes, struct pen_error *error);

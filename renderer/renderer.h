@@ -1,0 +1,71 @@
+/* The renderer: one GL context, scenes resident in GPU memory, requests in, pixels out.
+ * All calls come from the thread that created it. Never JSON, HTTP or sockets below this line. */
+#pragma once
+#include "protocol/result.h"
+#include "protocol/technique_info.h"
+#include <stddef.h>
+
+struct pen_renderer;
+
+enum pen_device_choice { PEN_DEVICE_AUTO, PEN_DEVICE_GPU, PEN_DEVICE_SURFACELESS, PEN_DEVICE_OSMESA };
+extern const char *const pen_device_choice_names[]; /* "auto", "gpu", "surfaceless", "osmesa" */
+
+struct pen_renderer_config {
+    uint32_t device;       /* enum pen_device_choice */
+    uint32_t device_index; /* which EGL device, counting GPUs from 0 */
+    bool require_gpu;      /* fail rather than run in software */
+    bool debug;            /* GL debug output to stderr */
+    uint64_t gpu_memory_bytes; /* budget for scenes, images and shadow inputs; 0: 1 GiB */
+};
+
+/* Every registered method; usable without a renderer and without a GPU. */
+const struct pen_catalogue *pen_renderer_catalogue(void);
+
+/* Errors: PEN_UNAVAILABLE when there is no device of the asked kind. */
+struct pen_renderer *pen_renderer_create(
+    const struct pen_renderer_config *config, struct pen_error *error);
+void pen_renderer_destroy(struct pen_renderer *renderer);
+const struct pen_device_info *pen_renderer_device(const struct pen_renderer *renderer);
+
+/* Makes a scene resident from its blob; a no-op when it is. May evict others (LRU) to stay in the
+ * budget. Errors: PEN_UNPROCESSABLE for a bad blob, PEN_TOO_LARGE when it can never fit. */
+bool pen_renderer_load_scene(struct pen_renderer *renderer, const uint8_t id[PEN_ID_BYTES],
+    int blob_fd, struct pen_error *error);
+bool pen_renderer_has_scene(const struct pen_renderer *renderer, const uint8_t id[PEN_ID_BYTES]);
+void pen_renderer_drop_scene(struct pen_renderer *renderer, const uint8_t id[PEN_ID_BYTES]);
+uint64_t pen_renderer_gpu_bytes(const struct pen_renderer *renderer);
+
+/* Emission images are one-image blobs (.pscene with one image and no geometry). */
+bool pen_renderer_load_image(struct pen_renderer *renderer, const uint8_t id[PEN_ID_BYTES],
+    int blob_fd, struct pen_error *error);
+bool pen_renderer_has_image(const struct pen_renderer *renderer, const uint8_t id[PEN_ID_BYTES]);
+
+enum pen_pixel { PEN_PIXEL_RGBA8, PEN_PIXEL_RGBA16F, PEN_PIXEL_RGBA32F };
+
+struct pen_plane {
+    char name[16];     /* layer name */
+    uint32_t pixel;    /* enum pen_pixel */
+    uint32_t channels; /* meaningful ones of the four: 1, 3 or 4 */
+    void *data;        /* width * height pixels, tight, top row first */
+};
+
+/* Finished pixels. PEN_PIXEL_RGBA8: already tone-mapped and display-encoded. Owned by the caller,
+ * who may hand it to another thread, and ends it with pen_frame_finish. */
+struct pen_frame {
+    uint32_t width, height;
+    uint32_t plane_count;
+    struct pen_plane planes[PEN_LAYERS];
+};
+void pen_frame_finish(struct pen_frame *frame);
+
+/* Renders one checked request whose scene and images are resident. Fills the times, the completed
+ * request and the warnings of *result (not queue, load and encode). PEN_UNPROCESSABLE: the request
+ * asks what this scene does not have (camera 7 of 3). PEN_INTERNAL with a lost context: destroy. */
+bool pen_renderer_render(struct pen_renderer *renderer, const struct pen_request *request,
+    struct pen_frame *frame, struct pen_result *result, struct pen_error *error);
+/* True when the GL context was lost; the worker then exits and is replaced. */
+bool pen_renderer_is_lost(struct pen_renderer *renderer);
+
+/* Compiles and runs what common requests need, on a small built-in scene, so that the first real
+ * request is not slower than the tenth. Returns the milliseconds it took. */
+double pen_renderer_warm_up(struct pen_renderer *renderer);

@@ -82,7 +82,7 @@ struct pen_trace_scene {
     bool has_ground;
     float ground[5][3]; /* corners, and one for Embree */
     uint32_t ground_indices[2][3];
-    float extent; /* largest absolute coordinate */
+    float extent; /* largest absolute coordinate, without the ground */
     struct trace_hierarchy hierarchies[TRACE_HIERARCHIES];
     uint64_t builds;
     uint64_t clock; /* counts uses */

@@ -243,8 +243,6 @@ static void add_ground(struct pen_trace_scene *out, const struct pen_trace_groun
         out->ground[i][0] = ground->center[0] + (i == 1 || i == 2 ? 1 : -1) * ground->half_size;
         out->ground[i][1] = ground->center[1];
         out->ground[i][2] = ground->center[2] + (i < 2 ? 1 : -1) * ground->half_size;
-        for (int c = 0; c < 3; c++)
-            out->extent = fmaxf(out->extent, fabsf(out->ground[i][c]));
     }
     memcpy(out->ground_indices, quad, sizeof quad);
     out->has_ground = true;

@@ -81,7 +81,12 @@ struct pen_trace_job {
     uint32_t weighting;     /* enum pen_trace_weighting */
     bool adaptive;          /* all samples only near receivers whose pre-test is mixed */
     uint32_t dilation;      /* of that neighbourhood, receivers; 0: 4 */
-    float bias;             /* m, ray origins are lifted by this along the normal; 0: automatic */
+    /* Ray origins are lifted along the normal by the largest of `bias` (m), 2^-18 of the size of
+     * the coordinates (their rounding), and depth_error * distance to `eye`. Positions from a depth
+     * buffer need the last: 0x1p-16f when 32-bit floats hold depths of up to 100 near planes. */
+    float bias;
+    float eye[3];
+    float depth_error;
     uint32_t seed;
     uint32_t threads;     /* 0: as many as this process may run on */
     uint64_t deadline_ns; /* CLOCK_MONOTONIC; 0: none */

@@ -54,13 +54,15 @@ static bool read_receiver(const struct run *run, uint32_t pixel, struct trace_re
     float length = sqrtf(trace_dot(n, n));
     if (!(length > 0) || !isfinite(length + p[0] + p[1] + p[2]))
         return false;
-    float largest = fmaxf(fmaxf(fabsf(p[0]), fabsf(p[1])), fabsf(p[2]));
-    float bias = 0x1p-18f * fmaxf(largest, 0.25f * run->scene->extent);
+    float largest = fmaxf(fmaxf(fabsf(p[0]), fabsf(p[1])), fabsf(p[2])), distance2 = 0;
+    for (int c = 0; c < 3; c++)
+        distance2 += (p[c] - run->job->eye[c]) * (p[c] - run->job->eye[c]);
+    float rounding = 0x1p-18f * fmaxf(largest, 0.25f * run->scene->extent);
+    out->bias = fmaxf(fmaxf(run->job->bias, rounding), run->job->depth_error * sqrtf(distance2));
     for (int c = 0; c < 3; c++) {
         out->position[c] = p[c];
         out->normal[c] = n[c] / length;
     }
-    out->bias = run->job->bias > 0 ? run->job->bias : bias;
     out->pixel = pixel;
     return true;
 }

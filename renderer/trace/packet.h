@@ -16,6 +16,13 @@ struct trace_emitter {
     RTCScene scene; /* what casts for this light */
 };
 
+struct trace_emitter trace_emitter_of(const struct pen_trace_light *light); /* scene is left NULL */
+/* What of it decides which triangles can cast. */
+struct trace_silhouette trace_silhouette_of(const struct trace_emitter *emitter);
+/* The mean of its emission: exact for rectangles, to about 1e-4 for disks. */
+bool trace_emitter_average(
+    const struct trace_emitter *emitter, float mean[3], struct pen_error *error);
+
 /* Sample points as signed 32-bit fractions of [-1,1]. Points 2k and 2k + 1 share a stratum. */
 struct trace_block {
     const int32_t *u, *v;

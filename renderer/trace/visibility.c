@@ -334,83 +334,6 @@ static bool prepare_points(struct run *run, struct pen_error *error)
     return true;
 }
 
-/* The mean of the emission over the light: exact for rectangles. */
-static bool average_emission(struct run *run, struct pen_error *error)
-{
-    const struct trace_emitter *e = &run->emitter;
-    double sum[3] = {0};
-    size_t texels = (size_t)e->columns * e->rows;
-    if (!e->emission) {
-        run->mean_emission[0] = run->mean_emission[1] = run->mean_emission[2] = 1;
-        return true;
-    }
-    if (e->type == PEN_TRACE_RECT) {
-        for (size_t i = 0; i < texels; i++)
-            for (int c = 0; c < 3; c++)
-                sum[c] += e->emission[4 * i + (size_t)c];
-        for (int c = 0; c < 3; c++)
-            run->mean_emission[c] = (float)(sum[c] / (double)texels);
-        return true;
-    }
-    uint32_t *xs = malloc(2 * (size_t)MAX_SAMPLES * sizeof *xs), *ys = xs + MAX_SAMPLES;
-    if (!xs || !trace_samples_net(0, MAX_SAMPLES, 0, xs, ys)) {
-        free(xs);
-        return pen_fail(error, PEN_INTERNAL, "", "Out of memory.");
-    }
-    for (uint32_t i = 0; i < MAX_SAMPLES; i++) {
-        float u = (float)xs[i] * 0x1p-31f - 1, v = (float)ys[i] * 0x1p-31f - 1, rgb[3];
-        trace_disk_point(&u, &v);
-        trace_emission_at(e, u, v, rgb);
-        for (int c = 0; c < 3; c++)
-            sum[c] += (double)rgb[c];
-    }
-    for (int c = 0; c < 3; c++)
-        run->mean_emission[c] = (float)(sum[c] / MAX_SAMPLES);
-    free(xs);
-    return true;
-}
-
-static void prepare_emitter(struct run *run, const struct pen_trace_light *light)
-{
-    struct trace_emitter *e = &run->emitter;
-    bool point = light->type == PEN_TRACE_POINT;
-    *e = (struct trace_emitter){.type = light->type,
-        .half = {point ? 0 : light->half[0], light->type == PEN_TRACE_RECT ? light->half[1]
-                                             : point                       ? 0
-                                                                           : light->half[0]},
-        .cos_cone = light->cos_cone,
-        .emission = point ? NULL : light->emission,
-        .columns = light->columns,
-        .rows = light->rows,
-        .bilinear = light->bilinear};
-    for (int c = 0; c < 3; c++) {
-        e->origin[c] = light->origin[c];
-        e->z[c] = light->z[c];
-        e->a[c] = e->half[0] * light->x[c];
-        e->b[c] = e->half[1] * light->y[c];
-    }
-}
-
-/* What of the light decides which triangles can cast. */
-static struct trace_silhouette silhouette_of(const struct trace_emitter *e)
-{
-    struct trace_silhouette s = {.shape = e->type == PEN_TRACE_SPHERE ? TRACE_BALL
-                                          : e->type == PEN_TRACE_DISK ? TRACE_ROUND
-                                          : e->type == PEN_TRACE_SUN  ? TRACE_PARALLEL
-                                                                      : TRACE_SQUARE};
-    for (int c = 0; c < 3; c++) {
-        s.center[c] = s.shape == TRACE_PARALLEL ? -e->z[c] : e->origin[c];
-        s.a[c] = e->a[c];
-        s.b[c] = e->b[c];
-    }
-    if (s.shape == TRACE_BALL) {
-        memset(s.a, 0, sizeof s.a);
-        memset(s.b, 0, sizeof s.b);
-        s.a[0] = e->half[0];
-    }
-    return s;
-}
-
 static bool check_job(
     const struct pen_trace_light *light, const struct pen_trace_job *job, struct pen_error *error)
 {
@@ -431,6 +354,23 @@ static bool check_job(
     return true;
 }
 
+/* The adaptive mode's first half: settles what the pre-test settles and leaves the rest in `full`.
+ */
+static bool select_receivers(
+    struct run *run, uint32_t threads, uint32_t tiles, double *cpu_seconds, struct pen_error *error)
+{
+    size_t count = (size_t)run->job->width * run->job->height;
+    run->verdicts = calloc(count, 1);
+    run->full = calloc(count, 1);
+    if (!run->verdicts || !run->full)
+        return pen_fail(error, PEN_INTERNAL, "", "Out of memory.");
+    trace_parallel(threads, tiles, pretest_tile, run, cpu_seconds);
+    if (!dilate(run))
+        return pen_fail(error, PEN_INTERNAL, "", "Out of memory.");
+    trace_parallel(threads, tiles, settle_tile, run, cpu_seconds);
+    return true;
+}
+
 bool pen_trace_visibility(struct pen_trace_scene *scene, const struct pen_trace_light *light,
     const struct pen_trace_job *job, const struct pen_trace_result *result,
     struct pen_trace_stats *stats, struct pen_error *error)
@@ -444,10 +384,10 @@ bool pen_trace_visibility(struct pen_trace_scene *scene, const struct pen_trace_
     run.samples = point ? 1 : 1u << log2_floor(2 * job->samples - 1);
     run.position_stride = job->position_stride ? job->position_stride : 3;
     run.normal_stride = job->normal_stride ? job->normal_stride : 3;
-    prepare_emitter(&run, light);
+    run.emitter = trace_emitter_of(light);
     run.mode = (run.emitter.emission ? TRACE_COLOUR : 0) |
                (job->weighting == PEN_TRACE_G && !point ? TRACE_WEIGHTS : 0);
-    struct trace_silhouette silhouette = silhouette_of(&run.emitter);
+    struct trace_silhouette silhouette = trace_silhouette_of(&run.emitter);
     uint64_t builds = scene->builds;
     const struct trace_hierarchy *hierarchy = trace_hierarchy_get(scene, &silhouette, error);
     if (!hierarchy)
@@ -455,7 +395,8 @@ bool pen_trace_visibility(struct pen_trace_scene *scene, const struct pen_trace_
     double build_seconds = scene->builds != builds ? trace_seconds() - start : 0;
     start = trace_seconds();
     run.emitter.scene = hierarchy->scene;
-    if (!average_emission(&run, error) || !prepare_points(&run, error))
+    if (!trace_emitter_average(&run.emitter, run.mean_emission, error) ||
+        !prepare_points(&run, error))
         goto fail;
     run.tile_height = job->height == 1 ? 1 : TILE;
     run.tile_width = job->height == 1 ? TILE_RECEIVERS : TILE;
@@ -463,20 +404,9 @@ bool pen_trace_visibility(struct pen_trace_scene *scene, const struct pen_trace_
     uint32_t tiles = run.tiles_x * ((job->height + run.tile_height - 1) / run.tile_height);
     uint32_t threads = trace_thread_count(job->threads);
     trace_parallel(threads, tiles, clear_tile, &run, &cpu_seconds);
-    if (job->adaptive && run.samples > PRETEST_NET + PRETEST_RIM) {
-        run.verdicts = calloc((size_t)job->width * job->height, 1);
-        run.full = calloc((size_t)job->width * job->height, 1);
-        if (!run.verdicts || !run.full) {
-            pen_fail(error, PEN_INTERNAL, "", "Out of memory.");
-            goto fail;
-        }
-        trace_parallel(threads, tiles, pretest_tile, &run, &cpu_seconds);
-        if (!dilate(&run)) {
-            pen_fail(error, PEN_INTERNAL, "", "Out of memory.");
-            goto fail;
-        }
-        trace_parallel(threads, tiles, settle_tile, &run, &cpu_seconds);
-    }
+    if (job->adaptive && run.samples > PRETEST_NET + PRETEST_RIM &&
+        !select_receivers(&run, threads, tiles, &cpu_seconds, error))
+        goto fail;
     trace_parallel(threads, tiles, sample_tile, &run, &cpu_seconds);
     if (atomic_load(&run.late)) {
         pen_fail(error, PEN_DEADLINE, "", "The deadline passed while rays were traced.");

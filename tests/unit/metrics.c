@@ -79,8 +79,10 @@ static void test_rmse(void)
     other[3][0] = 0.02f;
     noise[2][0] = 0.98f;
     noise[3][0] = 0.02f;
+    other[4][0] = noise[4][0] = 0.021f;
+    other[5][0] = noise[5][0] = 0.979f;
     CHECK(pen_metrics_visibility(&a, &b, &v, NULL));
-    CHECK(v.penumbra_pixels == 1 + (0.98f < 0.98) + (0.02f > 0.02));
+    CHECK(v.penumbra_pixels == 3 + (0.98f < 0.98) + (0.02f > 0.02));
     CHECK_NEAR(v.rmse, sqrt(0.1 / PIXELS), 1e-7);
     CHECK_NEAR(v.penumbra_rmse, 0.1 / sqrt((double)v.penumbra_pixels), 1e-7);
     CHECK_NEAR(v.mean_error, -0.2 / PIXELS, 1e-8);

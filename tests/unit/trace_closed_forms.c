@@ -127,6 +127,47 @@ static void test_sphere(void)
     pen_trace_scene_destroy(scene);
 }
 
+/* Elsewhere: points of the disk that faces the receiver, counted one by one. */
+static double truth_sphere(const void *context, const float p[3])
+{
+    double height = *(const double *)context, to[3], length = 0;
+    int seen = 0;
+    enum { RINGS = 80, SPOKES = 160 };
+    for (int c = 0; c < 3; c++) {
+        to[c] = (c == 1 ? (double)LIGHT_Y : 0) - (double)p[c];
+        length += to[c] * to[c];
+    }
+    for (int c = 0; c < 3; c++)
+        to[c] /= sqrt(length);
+    double side[3] = {to[1], -to[0], 0}, norm = hypot(to[0], to[1]);
+    double up[3] = {-side[1] * to[2] / norm, side[0] * to[2] / norm,
+        (side[1] * to[0] - side[0] * to[1]) / norm};
+    for (int i = 0; i < RINGS * SPOKES; i++) {
+        double radius = (double)HALF * sqrt((i / SPOKES + 0.5) / RINGS);
+        double angle = 2 * M_PI * (i % SPOKES + 0.5) / SPOKES;
+        double u = radius * cos(angle), v = radius * sin(angle);
+        double x = u * side[0] / norm + v * up[0],
+               y = (double)LIGHT_Y + u * side[1] / norm + v * up[1];
+        seen += (double)p[0] + (x - (double)p[0]) * height / y > 0;
+    }
+    return (double)seen / (RINGS * SPOKES);
+}
+
+static void test_sphere_aside(void)
+{
+    double height = 1.5;
+    struct pen_trace_scene *scene = edge_scene(height);
+    struct receivers *r = grid_receivers((float[2]){-1, 1}, (float[2]){2, 5});
+    struct pen_trace_job job = job_of(r, 256);
+    struct pen_trace_light light = downward_light(PEN_TRACE_SPHERE, HALF);
+    for (int i = 0; i < GRID * GRID; i++)
+        r->positions[i][0] *= i & 1 ? 1 : 0.25f;
+    trace(scene, &light, &job, r);
+    CHECK(check_truth("edge, sphere, aside", r, 3, truth_sphere, &height, 256) < 0.008);
+    free(r);
+    pen_trace_scene_destroy(scene);
+}
+
 static void test_square_caster(void)
 {
     double height = 1.2;
@@ -286,6 +327,7 @@ int main(void)
 {
     test_edge();
     test_sphere();
+    test_sphere_aside();
     test_square_caster();
     test_stacked();
     test_duplicate();

@@ -308,6 +308,56 @@ static void test_primary(struct pen_trace_scene *scene, const struct picture *p)
     (void)sky;
 }
 
+/* Positions as a depth buffer gives them: off along the view by up to 2^-17 of the distance. */
+static void test_depth_error(struct pen_trace_scene *scene, struct picture *p)
+{
+    struct picture *off = take_picture(scene);
+    struct pen_trace_light light = downward_light(PEN_TRACE_RECT, 0.5f);
+    const float eye[3] = {2, 2, 3};
+    double rmse[2];
+    struct pen_trace_job job = job_for(p, 64);
+    run(scene, &light, &job, p);
+    for (int i = 0; i < PIXELS; i++) {
+        float error = 0x1p-17f * (float)(i * 40503u % 65536u) / 32768 - 0x1p-17f;
+        for (int c = 0; c < 3; c++)
+            off->positions[i][c] += error * (off->positions[i][c] - eye[c]);
+    }
+    for (int fixed = 0; fixed < 2; fixed++) {
+        job = job_for(off, 64);
+        memcpy(job.eye, eye, sizeof eye);
+        job.depth_error = fixed ? 0x1p-16f : 0;
+        run(scene, &light, &job, off);
+        double squares = 0;
+        for (int i = 0; i < PIXELS; i++) {
+            double d = (double)(off->visibility[i][3] - p->visibility[i][3]);
+            squares += d * d;
+        }
+        rmse[fixed] = sqrt(squares / PIXELS);
+    }
+    printf("positions from depth: RMSE %.4f, lifted %.6f\n", rmse[0], rmse[1]);
+    CHECK(rmse[0] > 0.05 && rmse[1] < 0.002);
+    free(off);
+}
+
+/* A spot lights inside its cone only, and needs one ray a receiver. */
+static void test_spot(struct pen_trace_scene *scene)
+{
+    struct receivers *r = grid_receivers((float[2]){-3, 3}, (float[2]){3, 6});
+    struct pen_trace_light light = downward_light(PEN_TRACE_POINT, 0);
+    light.cos_cone = 0.6f;
+    struct pen_trace_job job = job_of(r, 64);
+    trace(scene, &light, &job, r);
+    int inside = 0;
+    for (int i = 0; i < GRID * GRID; i++) {
+        double x = (double)r->positions[i][0], z = (double)r->positions[i][2];
+        bool lit = (double)LIGHT_Y / sqrt(x * x + z * z + 9) > (double)light.cos_cone;
+        CHECK(r->visibility[i][3] == (lit ? 1 : 0) && r->error[i] == 0);
+        inside += lit;
+    }
+    CHECK(inside > 500 && inside < 3500);
+    free(r);
+}
+
 static void test_refusals(struct pen_trace_scene *scene, struct picture *p)
 {
     struct pen_trace_light light = downward_light(PEN_TRACE_RECT, 0.5f);
@@ -383,6 +433,8 @@ int main(void)
     test_adaptive(scene, picture);
     test_target(scene, picture);
     test_weighting();
+    test_depth_error(scene, picture);
+    test_spot(scene);
     test_refusals(scene, picture);
     free(picture);
     pen_trace_scene_destroy(scene);

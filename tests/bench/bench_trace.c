@@ -1,12 +1,15 @@
 /* Times ray-traced visibility on a scene blob: bench_trace FILE.pscene [samples] [runs]
  * The view and the light are those of the bunny comparison (800 x 600, a 1 x 1 m light); prints the
- * best of `runs` (8) for all receivers and for the adaptive mode, and their difference. */
+ * best of `runs` (8) for all receivers and for the adaptive mode, and their difference. Then builds
+ * the shader's hierarchy and asks both for the way to the light's centre. */
+#include "renderer/trace/bvh.h"
 #include "renderer/trace/trace.h"
 #include <fcntl.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 #include <unistd.h>
 
 #define WIDTH 800
@@ -92,6 +95,52 @@ static bool run_view(struct pen_trace_scene *scene, const float eye[3], const fl
     return ok;
 }
 
+/* Hard shadows by the shader's hierarchy, against Embree's. */
+static bool compare_hierarchies(
+    const struct psc_scene *blob, struct pen_trace_scene *scene, float *buffers[4])
+{
+    struct pen_trace_light light = square_light();
+    struct pen_bvh bvh;
+    struct pen_error error = {0};
+    struct timespec start, end;
+    clock_gettime(CLOCK_MONOTONIC, &start);
+    if (!pen_bvh_build_scene(blob, 0, &bvh, &error)) {
+        fprintf(stderr, "%s\n", error.message);
+        return false;
+    }
+    clock_gettime(CLOCK_MONOTONIC, &end);
+    printf("own hierarchy: %u nodes, depth %u, cost %.1f, built in %.1f ms\n", bvh.node_count,
+        bvh.depth, (double)bvh.cost,
+        1e3 * (double)(end.tv_sec - start.tv_sec) + 1e-6 * (double)(end.tv_nsec - start.tv_nsec));
+    light.type = PEN_TRACE_POINT;
+    light.cos_cone = -1;
+    struct pen_trace_job job = {.positions = buffers[0],
+        .normals = buffers[1],
+        .width = WIDTH,
+        .height = HEIGHT,
+        .samples = 1,
+        .bias = 1e-4f};
+    struct pen_trace_result result = {.visibility = buffers[2]};
+    bool ok = pen_trace_visibility(scene, &light, &job, &result, NULL, &error);
+    size_t asked = 0, differ = 0;
+    for (size_t i = 0; ok && i < WIDTH * HEIGHT; i++) {
+        const float *p = buffers[0] + 3 * i, *n = buffers[1] + 3 * i;
+        float origin[3], direction[3], cosine = 0;
+        for (int c = 0; c < 3; c++) {
+            origin[c] = p[c] + 1e-4f * n[c];
+            direction[c] = light.origin[c] - origin[c];
+            cosine += direction[c] * n[c];
+        }
+        if (!(cosine > 1e-3f))
+            continue;
+        asked++;
+        differ += pen_bvh_occluded(&bvh, origin, direction, 0.9999f) == (buffers[2][4 * i + 3] > 0);
+    }
+    printf("%zu of %zu rays answered otherwise than by Embree\n", differ, asked);
+    pen_bvh_finish(&bvh);
+    return ok;
+}
+
 int main(int argc, char **argv)
 {
     struct psc_scene blob;
@@ -123,6 +172,7 @@ int main(int argc, char **argv)
         samples, runs, buffers);
     ok = ok && run_view(scene, (const float[]){-1.6f, 1.1f, -1.4f},
                    (const float[]){-0.2f, 0.2f, -0.1f}, samples, runs, buffers);
+    ok = ok && compare_hierarchies(&blob, scene, buffers);
     for (int i = 0; i < 4; i++)
         free(buffers[i]);
     pen_trace_scene_destroy(scene);

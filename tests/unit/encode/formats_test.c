@@ -1,6 +1,7 @@
 /* JPEG and WebP against their own decoders, refusals, and four threads at once. */
 #include "tests/unit/check.h"
 #include "tests/unit/encode/pattern.h"
+#include <dirent.h>
 #include <pthread.h>
 #include <turbojpeg.h>
 #include <webp/decode.h>
@@ -164,9 +165,22 @@ static void threads(void)
         pen_bytes_finish(&results[0][format]);
 }
 
+static int count_threads(void)
+{
+    int count = 0;
+    DIR *tasks = opendir("/proc/self/task");
+    for (struct dirent *entry; tasks && (entry = readdir(tasks));)
+        count += entry->d_name[0] != '.';
+    if (tasks)
+        closedir(tasks);
+    return count;
+}
+
 int main(void)
 {
-    threads(); /* first, so that first-use initialisation is raced for */
+    int threads_before = count_threads(); /* a library of OpenImageIO's starts some when loaded */
+    threads();                            /* first, so that first-use initialisation is raced for */
+    CHECK(count_threads() == threads_before); /* no pool is kept behind our back */
     jpeg(160, 120, 3);
     jpeg(160, 120, 4);
     jpeg(33, 57, 1);

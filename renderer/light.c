@@ -63,6 +63,16 @@ static bool is_backdrop(const struct scene *scene, const float min[3], const flo
     return false;
 }
 
+void light_find_backdrops(const struct light *light, const struct scene *scene, bool *backdrop)
+{
+    bool sun = light->source->type == PEN_LIGHT_SUN;
+    for (uint32_t i = 0; i < scene->blob.instance_count; i++) {
+        float min[3], max[3];
+        instance_bounds(&scene->blob, i, min, max);
+        backdrop[i] = is_backdrop(scene, min, max, light->origin, sun ? light->z : NULL);
+    }
+}
+
 /* Bounds of everything that casts. Emitters with an extent are judged by their centre, which is
  * enough: a backdrop lies on the border of all geometry. */
 static void caster_bounds(const struct scene *scene, const struct light *light, float bounds[2][3])

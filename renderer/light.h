@@ -49,6 +49,9 @@ void light_face_clip(
 void light_face_window(
     const struct light_face *face, const float casters[2][3], const float sample[2], float rect[4]);
 
+/* Marks the instances that cannot cast in this light: flat and on the far border of the bounds. */
+void light_find_backdrops(const struct light *light, const struct scene *scene, bool *backdrop);
+
 /* What a depth pass of this face culls with. */
 void light_face_cull(const struct light_face *face, const float sample[2], const float rect[4],
     struct cull_view *cull);

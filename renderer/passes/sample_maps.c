@@ -47,7 +47,7 @@ static bool draw_layers(struct technique_run *run, const struct sample_point *po
         light_face_window(run->face, run->light->casters, points[i].at, rect);
         gl.NamedFramebufferTextureLayer(
             framebuffer, GL_DEPTH_ATTACHMENT, array->name, 0, (GLint)i);
-        ok = pass_draw_casters(run, framebuffer, array->width, points[i].at, rect, error);
+        ok = pass_draw_casters(run, framebuffer, array->width, points[i].at, rect, false, error);
     }
     gl.DeleteFramebuffers(1, &framebuffer);
     gl_timer_end(&run->ctx->timer);

@@ -27,8 +27,8 @@ static const struct pen_param rows[] = {
 static bool record(struct technique_run *run, struct pen_error *error)
 {
     const struct pcss *params = run->params;
-    const struct shadow_input *map = pass_depth_map(run, params->map_size, error);
-    const struct shadow_input *min_max = pass_min_max(run, params->map_size, error);
+    const struct shadow_input *map = pass_caster_map(run, params->map_size, error);
+    const struct shadow_input *min_max = pass_caster_min_max(run, params->map_size, error);
     if (!map || !min_max)
         return false;
     struct pass_texture pyramid = {UNIT_MIN_MAX, min_max->textures[0].name, GL_SAMPLE_NEAREST};

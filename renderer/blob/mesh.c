@@ -132,25 +132,53 @@ static void flat_normals(struct geometry *g)
     }
 }
 
+/* sources[i]: the caller's vertex that becomes ours number i. Primitives cut from one large vertex
+ * buffer name few of its vertices: the others are left behind. */
+static void choose_vertices(struct geometry *g, const struct psc_mesh *mesh, uint32_t **sources)
+{
+    g->index_count = mesh->index_count;
+    g->indices = psc_allocate(g->index_count, sizeof *g->indices);
+    if (!mesh->normals) { /* flat: every corner is a vertex of its own */
+        g->vertex_count = mesh->index_count;
+        *sources = psc_allocate(g->vertex_count, sizeof **sources);
+        for (uint32_t i = 0; i < g->index_count; i++) {
+            (*sources)[i] = mesh->indices ? mesh->indices[i] : i;
+            g->indices[i] = i;
+        }
+        return;
+    }
+    uint32_t *ours = psc_allocate(mesh->vertex_count, sizeof *ours);
+    memset(ours, 0, mesh->vertex_count * sizeof *ours);
+    for (uint32_t i = 0; i < g->index_count; i++)
+        ours[mesh->indices ? mesh->indices[i] : i] = 1;
+    *sources = psc_allocate(mesh->vertex_count, sizeof **sources);
+    for (uint32_t v = 0; v < mesh->vertex_count; v++)
+        if (ours[v]) {
+            ours[v] = g->vertex_count;
+            (*sources)[g->vertex_count++] = v;
+        }
+    for (uint32_t i = 0; i < g->index_count; i++)
+        g->indices[i] = ours[mesh->indices ? mesh->indices[i] : i];
+    free(ours);
+}
+
 bool psc_geometry_create(struct geometry *g, const struct psc_mesh *mesh, struct pen_error *error)
 {
     memset(g, 0, sizeof *g);
     if (!check_mesh(mesh, error))
         return false;
-    bool split = !mesh->normals;
-    uint32_t n = split ? mesh->index_count : mesh->vertex_count;
-    g->vertex_count = g->vertex_capacity = n;
-    g->index_count = mesh->index_count;
+    uint32_t *sources;
+    choose_vertices(g, mesh, &sources);
+    uint32_t n = g->vertex_capacity = g->vertex_count;
     g->positions = psc_allocate(n, sizeof *g->positions);
     g->normals = psc_allocate(n, sizeof *g->normals);
     g->uv = psc_allocate(n, sizeof *g->uv);
     g->colors = psc_allocate(n, sizeof *g->colors);
-    g->indices = psc_allocate(g->index_count, sizeof *g->indices);
-    if (mesh->tangents && !split) /* given tangents belong to given normals */
+    if (mesh->tangents && mesh->normals) /* given tangents belong to given normals */
         g->tangents = psc_allocate(n, sizeof *g->tangents);
 
     for (uint32_t i = 0; i < n; i++) {
-        uint32_t from = split && mesh->indices ? mesh->indices[i] : i;
+        uint32_t from = sources[i];
         memcpy(g->positions[i], mesh->positions[from], sizeof g->positions[i]);
         if (mesh->normals)
             memcpy(g->normals[i], mesh->normals[from], sizeof g->normals[i]);
@@ -163,10 +191,9 @@ bool psc_geometry_create(struct geometry *g, const struct psc_mesh *mesh, struct
         for (int k = 0; k < 4; k++)
             g->colors[i][k] = mesh->colors ? unorm8(mesh->colors[from][k]) : 255;
     }
-    for (uint32_t i = 0; i < g->index_count; i++)
-        g->indices[i] = split || !mesh->indices ? i : mesh->indices[i];
+    free(sources);
 
-    if (split)
+    if (!mesh->normals)
         flat_normals(g);
     else
         normalize_normals(g);

@@ -1,5 +1,6 @@
 /* Tangents from texture coordinates: each triangle's direction of growing u, accumulated per vertex
- * with the corner's angle as weight, then made orthogonal to the normal. */
+ * with the corner's angle as weight, then made orthogonal to the normal. The bitangent,
+ * w * cross(normal, tangent), points against growing v: up in the image, where green points. */
 #include "renderer/blob/geometry.h"
 #include <math.h>
 #include <stdlib.h>
@@ -28,7 +29,7 @@ static bool triangle_tangent(
         return false;
     for (int k = 0; k < 3; k++)
         tangent[k] /= length;
-    *side = area < 0;
+    *side = area > 0;
     return true;
 }
 
@@ -88,7 +89,7 @@ static void orthonormalize(const float n[3], const double sum[3], float tangent[
 void psc_geometry_make_tangents(struct geometry *g)
 {
     uint32_t before = g->vertex_count;
-    /* Per vertex and side (0: uv counter-clockwise, 1: mirrored). */
+    /* Per vertex and side. */
     double(*sums)[2][3] = psc_allocate(before, sizeof *sums);
     bool(*used)[2] = psc_allocate(before, sizeof *used);
     memset(sums, 0, before * sizeof *sums);

@@ -74,7 +74,7 @@ static void planar_mask(struct model *model, const struct pen_generated_options 
  * a light that is above the skirts' planes. */
 static void empty_room(struct model *model)
 {
-    const double top = 2.5, run = 1.5, drop = run * tan(15 * M_PI / 180);
+    const double top = 2.5, run = 1.5, drop = run * tan(8 * M_PI / 180);
     uint32_t floor_material = model_material(model, 0.5, 0.5, 0.5, 1, 0);
     uint32_t skirt_material = model_material(model, 0.6, 0.45, 0.35, 1, 0);
     struct shape s = {0};
@@ -95,8 +95,9 @@ static void empty_room(struct model *model)
 
 void model_closed_form(struct model *model, const struct pen_generated_options *o)
 {
-    const double side_view[] = {2.6, fmin(0.9, 0.75 * o->second_height), 3.0};
+    const double side_view[] = {1.9, fmin(0.9, 0.75 * o->caster_height), 1.3};
     const double high_view[] = {2.2, 2.4, 3.4}, origin[] = {0, 0, 0};
+    const double edge[] = {-0.05, 0, -0.2};
     model_look(model, high_view, origin, 45);
     if (o->kind == PEN_GENERATED_EMPTY_ROOM) {
         empty_room(model);
@@ -109,7 +110,7 @@ void model_closed_form(struct model *model, const struct pen_generated_options *
     case PEN_GENERATED_HALF_PLANE:
         plate(
             model, -HALF, 0, -HALF, HALF, o->caster_height, caster_material(model, 0.8, 0.4, 0.2));
-        model_look(model, side_view, origin, 45);
+        model_look(model, side_view, edge, 50);
         break;
     case PEN_GENERATED_SQUARE:
         plate(model, -h, h, -h, h, o->caster_height, caster_material(model, 0.8, 0.4, 0.2));
@@ -119,12 +120,12 @@ void model_closed_form(struct model *model, const struct pen_generated_options *
          * filter there sees two depths and must not conclude that light passes. */
         plate(model, -HALF, -0.6, -HALF, HALF, high, caster_material(model, 0.8, 0.4, 0.2));
         plate(model, -HALF, 0, -HALF, HALF, low, caster_material(model, 0.2, 0.4, 0.8));
-        model_look(model, side_view, origin, 45);
+        model_look(model, side_view, edge, 50);
         break;
     case PEN_GENERATED_DUPLICATE:
         plate(model, -HALF, 0, -HALF, HALF, high, caster_material(model, 0.8, 0.4, 0.2));
         plate(model, -HALF, 0, -HALF, HALF, low, caster_material(model, 0.2, 0.4, 0.8));
-        model_look(model, side_view, origin, 45);
+        model_look(model, side_view, edge, 50);
         break;
     case PEN_GENERATED_PLANAR_MASK:
         planar_mask(model, o);

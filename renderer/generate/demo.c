@@ -93,7 +93,7 @@ static void metalwork(struct model *model, const struct demo_materials *m)
     shape_move(&s, 0, -0.55, 0, 2.35, 12, 1);
     uint32_t first = s.vertex_count;
     shape_fence(&s, 1.9, 1.25, 0.10); /* just in front of the wall */
-    shape_move(&s, first, -1.35, 0, -2.38, 0, 1);
+    shape_move(&s, first, -1.70, 0, -2.38, 0, 1);
     model_place(model, model_mesh(model, &s, m->iron), 0, 0, 0, 0, 1);
 
     shape_armillary(&s, 1.25, 0.40);
@@ -125,7 +125,7 @@ static void pottery(struct model *model, const struct demo_materials *m)
     shape_lathe(&s, vase, 17, 5, 56, 2, 1);
     uint32_t blue = model_mesh(model, &s, m->blue);
     model_place(model, blue, 2.15, 0, 1.35, 0, 1.15);
-    model_place(model, blue, 0.35, 0.95, -2.75, 40, 0.62);
+    model_place(model, blue, 0.80, 0.95, -2.75, 40, 0.62);
 
     const double pot[][3] = {{0, 0, 1}, {0.13, 0, 1}, {0.185, 0.24, 1}, {0.205, 0.24, 1},
         {0.21, 0.31, 1}, {0.185, 0.315, 1}, {0.175, 0.27, 1}, {0, 0.26, 1}};
@@ -140,12 +140,12 @@ static void planting(struct model *model, const struct demo_materials *m)
 {
     struct shape wood = {0}, leaves = {0}, curb = {0};
     shape_tree(&wood, &leaves, 3);
-    model_place(model, model_mesh(model, &wood, m->bark), 0.05, 0.05, -1.0, 0, 1);
-    model_place(model, model_mesh(model, &leaves, m->leaf), 0.05, 0.05, -1.0, 0, 1);
+    model_place(model, model_mesh(model, &wood, m->bark), 0.40, 0.05, -0.95, 0, 1);
+    model_place(model, model_mesh(model, &leaves, m->leaf), 0.40, 0.05, -0.95, 0, 1);
     const double profile[][3] = {{0.50, 0, 1}, {0.50, 0.13, 1}, {0.485, 0.145, 1},
         {0.415, 0.145, 1}, {0.40, 0.13, 1}, {0.40, 0.05, 1}, {0.25, 0.065, 0}, {0, 0.075, 1}};
     shape_lathe(&curb, profile, 8, 4, 64, 8, 0.4);
-    model_place(model, model_mesh(model, &curb, m->wall), 0.05, 0, -1.0, 0, 1);
+    model_place(model, model_mesh(model, &curb, m->wall), 0.40, 0, -0.95, 0, 1);
 }
 
 void model_demo(struct model *model, const struct pen_generated_options *o)

@@ -106,8 +106,7 @@ void shape_arch(struct shape *s, double span, double spring, double depth)
 static void sphere_point(const void *context, double u, double v, double p[3])
 {
     double radius = *(const double *)context, a = 2 * M_PI * (u == 1 ? 0 : u);
-    double r = v >= 1 || v <= 0 ? radius * (v - (v > 0.5)) * -M_PI : radius * sin(M_PI * v);
-    r = v == 0 || v == 1 ? 0 : r;
+    double r = v == 0 || v == 1 ? 0 : radius * sin(M_PI * v);
     p[0] = r * cos(a);
     p[1] = -radius * cos(M_PI * v);
     p[2] = -r * sin(a);

@@ -27,7 +27,7 @@ static void hair(struct shape *s, struct dice *dice, const double centre[3], dou
     double along[3], axis[3], at[3], points[HAIR_PARTS + 1][3], radii[HAIR_PARTS + 1];
     dice_direction(dice, along);
     dice_direction(dice, axis);
-    double curl = dice_uniform(dice, 0.02, 0.20),
+    double curl = dice_uniform(dice, 0.03, 0.32),
            step = dice_uniform(dice, 0.8, 1.2) * 0.6 / HAIR_PARTS;
     for (int k = 0; k < 3; k++)
         at[k] = centre[k] + root * along[k];

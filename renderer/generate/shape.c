@@ -253,7 +253,8 @@ void shape_stand(struct shape *s, uint32_t first, const double origin[3], const 
 {
     double axes[3][3];
     memcpy(axes[1], axis, sizeof axes[1]);
-    any_perpendicular(axis, axes[0]);
+    normalize3(axes[1]);
+    any_perpendicular(axes[1], axes[0]);
     cross3(axes[0], axes[1], axes[2]);
     transform(s, first, axes, 1, origin);
 }

@@ -47,7 +47,7 @@ void shape_tube(struct shape *shape, const double (*points)[3], const double *ra
 /* Turns every vertex from number `first` on by `turn_deg` about +y, scales and moves it. */
 void shape_move(struct shape *shape, uint32_t first, double x, double y, double z, double turn_deg,
     double scale);
-/* Turns them so that +y becomes `axis` (unit) and the origin `origin`. */
+/* Turns them so that +y becomes `axis` and the origin `origin`. */
 void shape_stand(struct shape *shape, uint32_t first, const double origin[3], const double axis[3]);
 
 /* Small vectors. */

@@ -391,6 +391,12 @@ class Cli(unittest.TestCase):
         self.run_cli("scenes", "upload", "scene.glb")
         self.assertEqual(self.stub.calls[-1][3], self.scene.read_bytes())
 
+    def test_warnings(self):
+        self.stub.script = [(200, PNG, "image/png", [("X-Penumbra-Warning", "no colour"),
+                                                     ("X-Penumbra-Warning", "no texture")])]
+        done = self.run_cli("render", self.id, "-o", "a.png")
+        self.assertEqual(done.stderr, b"warning: no colour\nwarning: no texture\n")
+
     def test_token(self):
         self.run_cli("scenes", env=[("PENUMBRA_TOKEN", "secret")])
         self.assertEqual(self.stub.calls[-1][2]["Authorization"], "Bearer secret")

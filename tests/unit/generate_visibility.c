@@ -202,7 +202,7 @@ static void no_shadow(uint32_t kind)
                     r[row] = m[3];
                     for (int c = 0; c < 3; c++) {
                         const float *x = scene.positions[scene.indices[p->first_index + i + c]];
-                        double weight = c == (int)(n % 3) ? 0.989 : c == 0 ? 0.006 : 0.005;
+                        double weight = c == (int)(n % 3) ? 0.99 : 0.005;
                         r[row] += weight * (m[0] * x[0] + m[1] * x[1] + m[2] * x[2]);
                     }
                 }

@@ -4,4 +4,7 @@ if(TARGET penumbra_import)
     target_link_libraries(test_import_support PUBLIC penumbra_import penumbra_blob)
     penumbra_unit_test(import_accessor import_accessor.c
         LIBS test_import_support meshoptimizer::meshoptimizer)
+    foreach(part mesh node)
+        penumbra_unit_test(import_${part} import_${part}.c LIBS test_import_support)
+    endforeach()
 endif()

@@ -70,6 +70,8 @@ static void upload_materials(struct scene *s)
             memcpy(r->transforms[k] + 4, ref->transform + 3, 12);
         }
         s->has_emission |= m->emissive[0] + m->emissive[1] + m->emissive[2] > 0;
+        bool gloss = m->flags & PSC_SPECULAR_GLOSSINESS ? m->glossiness > 0.5f : m->roughness < 0.5f;
+        s->has_gloss |= gloss || m->surface.texture >= 0;
         s->has_unlit |= (m->flags & PSC_UNLIT) != 0;
     }
     s->materials = make_buffer(s, records, n * sizeof *records);

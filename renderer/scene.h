@@ -25,6 +25,7 @@ struct scene {
     uint32_t group_count;
     struct cull_command *command_room;
     bool has_emission, has_unlit;
+    bool has_gloss; /* some roughness is below 0.5 */
     uint64_t bytes;
     uint64_t last_use;
     void *trace; /* owned by the tracer when there is one; freed through trace_free */

@@ -1,0 +1,27 @@
+// A method's visibility() for every receiver of this face. The target starts at 1.
+#include "surface.glsl"
+#include "BODY"
+
+layout(location = 0) out vec4 vis;
+
+void main()
+{
+    ivec2 pixel = ivec2(gl_FragCoord.xy);
+    float depth = texelFetch(g_depth, pixel, 0).r;
+    if (depth == 0.0)
+        discard;
+    Surface s = surface_at(pixel, depth);
+    if (light.cube != 0 && max(abs(s.p.x), abs(s.p.y)) > s.p.z)
+        discard;
+    if (light.omni != 0 && s.p.z <= light.near_z)
+        discard;
+    if (s.p.z <= 0.0 && light.parallel == 0)
+        vis = vec4(0.0);
+    else {
+        // Coarse facets turn away from the light before the smooth surface that they stand for does:
+        // there its normal is the receiver's plane, or the terminator would show the facets.
+        if (!light_is_above_horizon(s.p, s.n))
+            s.n = surface_shading_normal(pixel);
+        vis = light_is_above_horizon(s.p, s.n) ? visibility(s) : vec4(0.0);
+    }
+}

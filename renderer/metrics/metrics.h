@@ -36,8 +36,8 @@ bool pen_metrics_ssim(const struct pen_metrics_image *test,
 
 /* What a viewer sees when flipping between the two pictures: LDR-FLIP (Andersson et al. 2020) of
  * display-encoded sRGB (clamped to [0,1]), 0 equal to 1. `pixels_per_degree`: of the viewer's eye;
- * 4 to 1000, 0: 67, a 0.7 m wide display of 3840 pixels seen from 0.7 m. Edge pixels are repeated outwards.
- * `map`, when not NULL: width * height values; *mean is its mean. */
+ * 4 to 1000, 0: 67, a 0.7 m wide display of 3840 pixels seen from 0.7 m. Edge pixels are repeated
+ * outwards. `map`, when not NULL: width * height values; *mean is its mean. */
 bool pen_metrics_flip(const struct pen_metrics_image *test,
     const struct pen_metrics_image *reference, double pixels_per_degree, float *map, double *mean,
     struct pen_error *error);

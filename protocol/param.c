@@ -14,7 +14,7 @@ static void store(const struct pen_param *row, void *object, uint32_t i, double 
     uint32_t u;
     switch (row->type) {
     case PEN_PARAM_FLOAT:
-        f = (float)value;
+        f = (float)value + 0.0f; /* no -0: equal requests have equal bytes */
         memcpy(at, &f, 4);
         break;
     case PEN_PARAM_INT:
@@ -80,7 +80,11 @@ bool pen_param_store(const struct pen_param *row, void *object, const double *va
         if (row->type != PEN_PARAM_FLOAT && v != floor(v))
             return pen_fail(
                 error, PEN_UNPROCESSABLE, pointer, "%s must be a whole number.", row->name);
-        if (v < min || v > max || (row->exclusive_min && v <= min))
+        /* Compared as they are stored, so that a value that passes here passes again later. */
+        double stored = v, low = min, high = max;
+        if (row->type == PEN_PARAM_FLOAT)
+            stored = (float)v, low = (float)min, high = (float)max;
+        if (stored < low || stored > high || (row->exclusive_min && stored <= low))
             return pen_fail(error, PEN_UNPROCESSABLE, pointer, "%s is %g, but must lie in %c%g, %g].",
                 row->name, v, row->exclusive_min ? '(' : '[', min, max);
     }

@@ -28,7 +28,7 @@ struct pen_param {
         double def_v[4]; /* vector default (count > 1) */
     };
     double min, max;     /* inclusive, for every component */
-    uint32_t applies;    /* lights: bit mask of the light types that have this row; 0: all */
+    uint32_t applies;    /* bit mask of the light types or camera modes that have this row; 0: all */
     uint16_t offset;     /* bytes from the start of the struct */
     uint8_t type;        /* enum pen_param_type */
     uint8_t count;       /* components, 1 to 4 */

@@ -41,21 +41,26 @@ static const struct pen_param request_rows[] = {
         .help = "Time at which animated emission is shown."),
 };
 
+#define LOOK_AT PEN_CAMERA_BIT(PEN_CAMERA_LOOK_AT)
+#define ORBIT PEN_CAMERA_BIT(PEN_CAMERA_ORBIT)
 #define CAMERA(field, ...) PARAM(struct pen_camera, field, __VA_ARGS__)
 static const struct pen_param camera_rows[] = {
-    CAMERA(index, .def = 0, .min = 0, .max = 65535, .help = "Camera of the scene, from 0."),
-    CAMERA(eye, .def_v = {0, 0, 1}, .min = -FAR, .max = FAR, .unit = "m",
+    CAMERA(index, .def = 0, .min = 0, .max = 65535, .applies = PEN_CAMERA_BIT(PEN_CAMERA_INDEX),
+        .help = "Camera of the scene, from 0."),
+    CAMERA(eye, .def_v = {0, 0, 1}, .min = -FAR, .max = FAR, .unit = "m", .applies = LOOK_AT,
         .help = "Position of the eye, world space."),
-    CAMERA(target, .def_v = {0, 0, 0}, .min = -FAR, .max = FAR, .unit = "m",
+    CAMERA(target, .def_v = {0, 0, 0}, .min = -FAR, .max = FAR, .unit = "m", .applies = LOOK_AT,
         .help = "Point at the centre of the image, world space."),
-    CAMERA(up, .def_v = {0, 1, 0}, .min = -1, .max = 1, .help = "Direction that is up in the image."),
+    CAMERA(up, .def_v = {0, 1, 0}, .min = -1, .max = 1, .applies = LOOK_AT,
+        .help = "Direction that is up in the image."),
     CAMERA(fov_y_deg, .def = 45, .min = 1, .max = 170, .unit = "deg",
+        .applies = LOOK_AT | ORBIT | PEN_CAMERA_BIT(PEN_CAMERA_AUTO),
         .help = "Vertical field of view."),
-    CAMERA(azimuth_deg, .def = 35, .min = -3600, .max = 3600, .unit = "deg",
+    CAMERA(azimuth_deg, .def = 35, .min = -3600, .max = 3600, .unit = "deg", .applies = ORBIT,
         .help = "Orbit: angle around +y, from +z towards +x."),
-    CAMERA(elevation_deg, .def = 25, .min = -89.9, .max = 89.9, .unit = "deg",
+    CAMERA(elevation_deg, .def = 25, .min = -89.9, .max = 89.9, .unit = "deg", .applies = ORBIT,
         .help = "Orbit: angle above the horizon."),
-    CAMERA(distance, .def = 0, .min = 0, .max = FAR, .unit = "m",
+    CAMERA(distance, .def = 0, .min = 0, .max = FAR, .unit = "m", .applies = ORBIT,
         .help = "Orbit: distance from the centre of the bounds; 0 frames them."),
 };
 

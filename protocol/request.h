@@ -38,6 +38,7 @@ struct pen_light {
 };
 
 enum pen_camera_mode { PEN_CAMERA_AUTO, PEN_CAMERA_LOOK_AT, PEN_CAMERA_INDEX, PEN_CAMERA_ORBIT };
+#define PEN_CAMERA_BIT(m) (1u << (m))
 
 struct pen_camera {
     uint32_t mode;     /* enum pen_camera_mode */
@@ -113,7 +114,7 @@ extern const char *const pen_pattern_names[]; /* built-in emission patterns */
 /* Rows of struct pen_request, pen_camera, pen_light, pen_output and pen_delivery.
  * The object-valued keys (technique, camera, lights, output) are handled by the documents. */
 struct pen_param_table pen_request_table(void);  /* base: struct pen_request */
-struct pen_param_table pen_camera_table(void);   /* base: struct pen_camera */
+struct pen_param_table pen_camera_table(void);   /* base: struct pen_camera; applies: modes */
 struct pen_param_table pen_light_table(void);    /* base: struct pen_light; see pen_param.applies */
 struct pen_param_table pen_output_table(void);   /* base: struct pen_output */
 struct pen_param_table pen_delivery_table(void); /* base: struct pen_delivery */

@@ -66,8 +66,7 @@ struct pen_route_match {
     const struct pen_route *route;       /* NULL: none */
     char id[PEN_ID_HEX + 1];             /* what stood for {id}, or "" */
     char name[PEN_TECHNIQUE_NAME_BYTES]; /* what stood for {name}, or "" */
-    uint32_t methods; /* when only the method does not fit: the rows that would, as a
-                         bit mask over their indices */
+    uint32_t methods;                    /* bit r: row r has this path, whatever its method */
 };
 
 /* Finds the row for a method and a decoded path without its query, token by token; nothing is

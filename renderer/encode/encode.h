@@ -1,4 +1,17 @@
-/* Image files from finished frames. Thread-safe: no state between calls. C++ stays behind it. */
+/* Image files from finished frames. Thread-safe: no state between calls. C++ stays behind it.
+ *
+ * What each format takes from a plane (see pen_encode_wants for what a renderer should deliver):
+ *   PNG and TIFF   8 bit from PEN_PIXEL_RGBA8 as it is; 16 bit from PEN_PIXEL_RGBA32F (or 16F)
+ * whose values are ALREADY display-encoded in [0, 1]: they are only quantised, round to nearest.
+ * The renderer tone-maps and encodes; this module never does. JPEG, WebP     PEN_PIXEL_RGBA8; alpha
+ * is dropped from JPEG; WebP at quality 100 is lossless. EXR            PEN_PIXEL_RGBA16F or
+ * RGBA32F, scene-linear. Bit depth 16: half, 32: float, 0: each plane in the precision in which it
+ * was delivered. All but EXR write planes[0] only. EXR names the channels of a single plane R G B A
+ * (one channel: Y, the depth plane: Z); several planes are layers of one part: the plane "beauty"
+ * keeps R G B A, the others are <plane>.R .G .B .A, <plane>.X .Y .Z for normal and position,
+ * depth.Z, <plane>.Y. Channels: 1 is written as grey, 3 as RGB, 4 as RGBA; alpha is unassociated
+ * and stored unchanged. NaN is written as 0, infinities as the largest finite value of the target.
+ */
 #pragma once
 #include "renderer/renderer.h"
 
@@ -9,12 +22,15 @@ struct pen_bytes {
 void pen_bytes_finish(struct pen_bytes *bytes);
 
 /* Encodes `frame` as output->format asks (bit depth 0: the format's default). `attributes` are
- * written as metadata where the format has any: NUL-terminated "key=value" strings, `attribute_count`
- * of them; no time stamps, so that the same request gives the same bytes.
- * Errors: PEN_INTERNAL. */
+ * written as metadata where the format has any: NUL-terminated "key=value" strings,
+ * `attribute_count` of them (PNG: text chunks, EXR: string attributes, TIFF and JPEG: one
+ * description, WebP: none); no time stamps, so that the same request gives the same bytes. On
+ * failure *bytes is zeroed. Errors: PEN_INTERNAL. */
 bool pen_encode(const struct pen_frame *frame, const struct pen_output *output,
     const char *const *attributes, uint32_t attribute_count, struct pen_bytes *bytes,
     struct pen_error *error);
 
-/* The pixel type the renderer should deliver for this output. */
+/* The pixel type the renderer should deliver for this output. With layer PEN_LAYER_ALL ask once per
+ * plane, with `layer` set to the plane's: at the default bit depth of EXR, depth and position want
+ * RGBA32F, because a half is too coarse for metres. */
 enum pen_pixel pen_encode_wants(const struct pen_output *output);

@@ -1,0 +1,126 @@
+#include "protocol/json_result.h"
+#include <stdio.h>
+
+/* Milliseconds to the microsecond: more digits than any timer here has are noise. */
+static void write_ms(struct pen_json *json, const char *key, double ms)
+{
+    char text[32];
+    snprintf(text, sizeof text, "%.3f", ms);
+    pen_json_raw(json, key, ms >= 0 && ms < 1e12 ? text : "null");
+}
+
+static uint32_t least(uint32_t a, uint32_t b)
+{
+    return a < b ? a : b;
+}
+
+static void write_device(struct pen_json *json, const struct pen_device_info *device)
+{
+    pen_json_object(json, "device");
+    pen_json_string(json, "renderer", device->renderer);
+    pen_json_string(json, "version", device->version);
+    pen_json_string(json, "platform", device->platform);
+    pen_json_bool(json, "software", device->software);
+    pen_json_end(json);
+}
+
+static void write_times(struct pen_json *json, const struct pen_result *result)
+{
+    pen_json_object(json, "stages_ms");
+    for (uint32_t s = 0; s < PEN_STAGES; s++)
+        write_ms(json, pen_stage_names[s], result->stage_ms[s]);
+    pen_json_end(json);
+    pen_json_array(json, "passes");
+    for (uint32_t p = 0; p < least(result->pass_count, PEN_MAX_PASSES); p++) {
+        const struct pen_pass_time *pass = &result->passes[p];
+        pen_json_object(json, NULL);
+        pen_json_string(json, "name", pass->name);
+        pen_json_string(
+            json, "stage", pass->stage < PEN_STAGES ? pen_stage_names[pass->stage] : NULL);
+        pen_json_uint(json, "count", pass->count);
+        write_ms(json, "ms", pass->ms);
+        pen_json_end(json);
+    }
+    pen_json_end(json);
+}
+
+char *pen_result_json(const struct pen_result *result, const struct pen_record_extra *extra,
+    const struct pen_catalogue *catalogue)
+{
+    static const struct pen_record_extra nothing;
+    static const char *const class_names[] = {"lit", "penumbra", "umbra"};
+    const struct pen_request *completed = &result->completed;
+    struct pen_json json = {0};
+    if (!extra)
+        extra = &nothing;
+    pen_json_object(&json, NULL);
+    if (extra->request_id)
+        pen_json_string(&json, "request_id", extra->request_id);
+    pen_json_id(&json, "scene", completed->scene);
+    pen_request_write(&json, "request", completed, catalogue);
+    pen_json_object(&json, "image");
+    if (extra->image_href)
+        pen_json_string(&json, "href", extra->image_href);
+    if (extra->etag)
+        pen_json_string(&json, "etag", extra->etag);
+    pen_json_string(&json, "type", pen_format_mime[completed->output.format]);
+    pen_json_uint(&json, "width", completed->width);
+    pen_json_uint(&json, "height", completed->height);
+    pen_json_uint(&json, "bytes", result->image_bytes);
+    pen_json_end(&json);
+    pen_json_array(&json, "warnings");
+    for (uint32_t w = 0; w < least(result->warning_count, PEN_MAX_WARNINGS); w++)
+        pen_json_string(&json, NULL, result->warnings[w]);
+    pen_json_end(&json);
+    write_device(&json, &result->device);
+    pen_json_object(&json, "cache");
+    pen_json_bool(&json, "result", extra->from_cache);
+    pen_json_bool(&json, "scene_resident", result->scene_was_resident);
+    pen_json_bool(&json, "shadow_inputs_reused", result->shadow_inputs_reused);
+    pen_json_end(&json);
+    write_ms(&json, "total_ms", extra->total_ms);
+    write_times(&json, result);
+    pen_json_object(&json, "pixels");
+    for (int c = 0; c < 3; c++)
+        pen_json_uint(&json, class_names[c], result->class_pixels[c]);
+    pen_json_uint(&json, "full_work", result->full_work_pixels);
+    pen_json_end(&json);
+    pen_json_uint(&json, "triangles_drawn", result->triangles_drawn);
+    pen_json_uint(&json, "gpu_bytes", result->gpu_bytes);
+    pen_json_end(&json);
+    return pen_json_finish(&json, NULL);
+}
+
+void pen_server_timing(const struct pen_result *result, double total_ms, char *text, size_t bytes)
+{
+    size_t at = 0;
+    text[0] = 0;
+    for (uint32_t s = 0; s <= PEN_STAGES && at < bytes; s++) {
+        bool total = s == PEN_STAGES;
+        int wrote = snprintf(text + at, bytes - at, "%s%s;dur=%.3f", s ? ", " : "",
+            total ? "total" : pen_stage_names[s], total ? total_ms : (double)result->stage_ms[s]);
+        if (wrote < 0 || at + (size_t)wrote >= bytes) {
+            text[at] = 0; /* half an entry is worse than none */
+            return;
+        }
+        at += (size_t)wrote;
+    }
+}
+
+char *pen_problem_json(const struct pen_error *error, const char *request_id)
+{
+    struct pen_json json = {0};
+    pen_json_object(&json, NULL);
+    /* The status says what kind of problem it is, which is what about:blank stands for. */
+    pen_json_string(&json, "type", "about:blank");
+    pen_json_string(&json, "title", pen_code_title(error->code));
+    pen_json_uint(&json, "status", error->code);
+    pen_json_string(&json, "detail", error->message);
+    if (error->pointer[0])
+        pen_json_string(&json, "pointer", error->pointer);
+    pen_json_bool(&json, "retryable", error->retryable);
+    if (request_id)
+        pen_json_string(&json, "request_id", request_id);
+    pen_json_end(&json);
+    return pen_json_finish(&json, NULL);
+}

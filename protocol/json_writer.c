@@ -1,0 +1,273 @@
+#include "protocol/json_writer.h"
+#include "protocol/request.h"
+#include <assert.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static void put(struct pen_json *json, const char *text, size_t bytes)
+{
+    if (json->size + bytes + 1 > json->capacity) {
+        size_t capacity = json->capacity ? json->capacity : 1024;
+        while (capacity < json->size + bytes + 1)
+            capacity *= 2;
+        json->text = realloc(json->text, capacity);
+        if (!json->text)
+            abort();
+        json->capacity = capacity;
+    }
+    memcpy(json->text + json->size, text, bytes);
+    json->size += bytes;
+    json->text[json->size] = 0;
+}
+
+static void put_text(struct pen_json *json, const char *text)
+{
+    put(json, text, strlen(text));
+}
+
+/* Bytes of the well-formed UTF-8 sequence at `s`, 0 when there is none (RFC 3629). */
+static size_t utf8_length(const unsigned char *s)
+{
+    if (s[0] < 0x80)
+        return 1;
+    unsigned low = 0x80, high = 0xbf;
+    size_t length;
+    if (s[0] >= 0xc2 && s[0] <= 0xdf)
+        length = 2;
+    else if (s[0] >= 0xe0 && s[0] <= 0xef) {
+        length = 3;
+        if (s[0] == 0xe0)
+            low = 0xa0; /* shorter forms exist */
+        else if (s[0] == 0xed)
+            high = 0x9f; /* surrogates */
+    } else if (s[0] >= 0xf0 && s[0] <= 0xf4) {
+        length = 4;
+        if (s[0] == 0xf0)
+            low = 0x90;
+        else if (s[0] == 0xf4)
+            high = 0x8f; /* above U+10FFFF */
+    } else
+        return 0;
+    if (s[1] < low || s[1] > high)
+        return 0;
+    for (size_t i = 2; i < length; i++)
+        if (s[i] < 0x80 || s[i] > 0xbf)
+            return 0;
+    return length;
+}
+
+static void put_quoted(struct pen_json *json, const char *text)
+{
+    const unsigned char *s = (const unsigned char *)text;
+    put(json, "\"", 1);
+    while (*s) {
+        size_t length = utf8_length(s);
+        char escape[8];
+        if (length == 0) {
+            put(json, "\xef\xbf\xbd", 3); /* U+FFFD */
+            length = 1;
+        } else if (*s == '"' || *s == '\\') {
+            escape[0] = '\\';
+            escape[1] = (char)*s;
+            put(json, escape, 2);
+        } else if (*s == '\n')
+            put(json, "\\n", 2);
+        else if (*s < 0x20 || *s == 0x7f) {
+            snprintf(escape, sizeof escape, "\\u%04x", *s);
+            put(json, escape, 6);
+        } else
+            put(json, (const char *)s, length);
+        s += length;
+    }
+    put(json, "\"", 1);
+}
+
+/* Comma and key in front of an item. */
+static void begin_item(struct pen_json *json, const char *key)
+{
+    if (json->depth) {
+        uint64_t bit = 1ull << (json->depth - 1);
+        if (json->filled & bit)
+            put(json, ",", 1);
+        json->filled |= bit;
+        assert(!key == !!(json->arrays & bit));
+    } else
+        assert(!key && !json->size);
+    if (key) {
+        put_quoted(json, key);
+        put(json, ":", 1);
+    }
+}
+
+static void open_container(struct pen_json *json, const char *key, bool array)
+{
+    begin_item(json, key);
+    assert(json->depth < 64);
+    uint64_t bit = 1ull << json->depth++;
+    json->arrays = array ? json->arrays | bit : json->arrays & ~bit;
+    json->filled &= ~bit;
+    put(json, array ? "[" : "{", 1);
+}
+
+void pen_json_object(struct pen_json *json, const char *key)
+{
+    open_container(json, key, false);
+}
+
+void pen_json_array(struct pen_json *json, const char *key)
+{
+    open_container(json, key, true);
+}
+
+void pen_json_end(struct pen_json *json)
+{
+    assert(json->depth);
+    uint64_t bit = 1ull << --json->depth;
+    put(json, json->arrays & bit ? "]" : "}", 1);
+}
+
+void pen_json_raw(struct pen_json *json, const char *key, const char *text)
+{
+    begin_item(json, key);
+    put_text(json, text);
+}
+
+void pen_json_string(struct pen_json *json, const char *key, const char *text)
+{
+    begin_item(json, key);
+    if (text)
+        put_quoted(json, text);
+    else
+        put_text(json, "null");
+}
+
+void pen_json_print_double(double value, char *text)
+{
+    for (int digits = 15; digits <= 17; digits++) {
+        snprintf(text, 32, "%.*g", digits, value);
+        if (strtod(text, NULL) == value)
+            return;
+    }
+}
+
+void pen_json_print_float(float value, char *text)
+{
+    for (int digits = 6; digits <= 9; digits++) {
+        snprintf(text, 32, "%.*g", digits, (double)value);
+        /* Readers go through a double, so that is what has to come back. */
+        if ((float)strtod(text, NULL) == value)
+            return;
+    }
+}
+
+void pen_json_float(struct pen_json *json, const char *key, float value)
+{
+    char text[32] = "null";
+    if (isfinite(value))
+        pen_json_print_float(value, text);
+    pen_json_raw(json, key, text);
+}
+
+void pen_json_double(struct pen_json *json, const char *key, double value)
+{
+    char text[32] = "null";
+    if (isfinite(value))
+        pen_json_print_double(value, text);
+    pen_json_raw(json, key, text);
+}
+
+void pen_json_int(struct pen_json *json, const char *key, int64_t value)
+{
+    char text[32];
+    snprintf(text, sizeof text, "%lld", (long long)value);
+    pen_json_raw(json, key, text);
+}
+
+void pen_json_uint(struct pen_json *json, const char *key, uint64_t value)
+{
+    char text[32];
+    snprintf(text, sizeof text, "%llu", (unsigned long long)value);
+    pen_json_raw(json, key, text);
+}
+
+void pen_json_bool(struct pen_json *json, const char *key, bool value)
+{
+    pen_json_raw(json, key, value ? "true" : "false");
+}
+
+void pen_json_null(struct pen_json *json, const char *key)
+{
+    pen_json_raw(json, key, "null");
+}
+
+void pen_json_floats(struct pen_json *json, const char *key, const float *values, uint32_t count)
+{
+    pen_json_array(json, key);
+    for (uint32_t i = 0; i < count; i++)
+        pen_json_float(json, NULL, values[i]);
+    pen_json_end(json);
+}
+
+void pen_json_id(struct pen_json *json, const char *key, const uint8_t *id)
+{
+    char text[PEN_ID_HEX + 1];
+    pen_id_to_hex(id, text);
+    pen_json_string(json, key, text);
+}
+
+static void write_component(
+    struct pen_json *json, const char *key, const struct pen_param *row, double value)
+{
+    if (row->choices)
+        pen_json_string(json, key, row->choices[(uint32_t)value]);
+    else if (row->type == PEN_PARAM_FLAG)
+        pen_json_bool(json, key, value != 0);
+    else if (row->type == PEN_PARAM_FLOAT)
+        pen_json_float(json, key, (float)value);
+    else
+        pen_json_int(json, key, (int64_t)value);
+}
+
+static void write_components(
+    struct pen_json *json, const char *key, const struct pen_param *row, const double *values)
+{
+    if (row->count == 1) {
+        write_component(json, key, row, values[0]);
+        return;
+    }
+    pen_json_array(json, key);
+    for (uint32_t i = 0; i < row->count; i++)
+        write_component(json, NULL, row, values[i]);
+    pen_json_end(json);
+}
+
+void pen_json_row(struct pen_json *json, const struct pen_param *row, const void *object)
+{
+    double values[4];
+    for (uint32_t i = 0; i < row->count; i++)
+        values[i] = pen_param_load(row, object, i);
+    write_components(json, row->name, row, values);
+}
+
+void pen_json_row_default(struct pen_json *json, const char *key, const struct pen_param *row)
+{
+    write_components(json, key, row, row->def_v);
+}
+
+char *pen_json_finish(struct pen_json *json, size_t *bytes)
+{
+    assert(json->depth == 0 && json->size);
+    char *text = json->text;
+    if (bytes)
+        *bytes = json->size;
+    *json = (struct pen_json){0};
+    return text;
+}
+
+void pen_json_discard(struct pen_json *json)
+{
+    free(json->text);
+    *json = (struct pen_json){0};
+}

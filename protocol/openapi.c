@@ -1,0 +1,269 @@
+#include "protocol/openapi.h"
+#include "protocol/openapi_schema.h"
+#include "protocol/request.h"
+#include "protocol/routes.h"
+#include <stdio.h>
+#include <string.h>
+
+#define SCHEMA "#/components/schemas/"
+
+static void write_ref(struct pen_json *json, const char *key, const char *target)
+{
+    pen_json_object(json, key);
+    pen_json_string(json, "$ref", target);
+    pen_json_end(json);
+}
+
+/* One media type of a "content" object; schema NULL: bytes. */
+static void write_media(struct pen_json *json, const char *type, const char *schema)
+{
+    pen_json_object(json, type);
+    if (schema)
+        write_ref(json, "schema", schema);
+    pen_json_end(json);
+}
+
+static void write_content(struct pen_json *json, enum pen_body body)
+{
+    static const char *const schemas[] = {
+        [PEN_BODY_REQUEST] = SCHEMA "RenderRequest",
+        [PEN_BODY_TECHNIQUES] = SCHEMA "TechniqueList",
+        [PEN_BODY_TECHNIQUE] = SCHEMA "TechniqueInfo",
+        [PEN_BODY_SCENES] = SCHEMA "SceneList",
+        [PEN_BODY_SCENE] = SCHEMA "Scene",
+        [PEN_BODY_IMAGES] = SCHEMA "ImageList",
+        [PEN_BODY_IMAGE_INFO] = SCHEMA "ImageInfo",
+        [PEN_BODY_STATS] = NULL,
+    };
+    pen_json_object(json, "content");
+    switch (body) {
+    case PEN_BODY_SCENE_UPLOAD:
+        write_media(json, "model/gltf-binary", NULL);
+        write_media(json, "multipart/form-data", NULL);
+        write_media(json, "application/zip", NULL);
+        break;
+    case PEN_BODY_IMAGE_UPLOAD:
+        write_media(json, "image/png", NULL);
+        write_media(json, "image/jpeg", NULL);
+        write_media(json, "image/webp", NULL);
+        break;
+    case PEN_BODY_IMAGE:
+        for (uint32_t i = 0; i < PEN_FORMATS; i++)
+            write_media(json, pen_format_mime[i], NULL);
+        write_media(json, "application/json", SCHEMA "Record");
+        break;
+    default:
+        write_media(json, "application/json", schemas[body]);
+    }
+    pen_json_end(json);
+}
+
+static void write_response(
+    struct pen_json *json, const char *status, const char *description, enum pen_body body)
+{
+    pen_json_object(json, status);
+    pen_json_string(json, "description", description);
+    if (body != PEN_BODY_NONE)
+        write_content(json, body);
+    pen_json_end(json);
+}
+
+/* One query parameter whose schema is written elsewhere. */
+static void write_query(struct pen_json *json, const char *prefix, const char *name,
+    const char *schema_prefix, bool vector)
+{
+    char text[160];
+    pen_json_object(json, NULL);
+    snprintf(text, sizeof text, "%s%s", prefix, name);
+    pen_json_string(json, "name", text);
+    pen_json_string(json, "in", "query");
+    if (vector) { /* "1,2,3" */
+        pen_json_string(json, "style", "form");
+        pen_json_bool(json, "explode", false);
+    }
+    snprintf(text, sizeof text, SCHEMA "%s%s", schema_prefix, name);
+    write_ref(json, "schema", text);
+    pen_json_end(json);
+}
+
+static void write_queries(struct pen_json *json, const char *prefix, struct pen_param_table table,
+    const char *schema_prefix)
+{
+    for (uint32_t r = 0; r < table.count; r++)
+        write_query(json, prefix, table.rows[r].name, schema_prefix, table.rows[r].count > 1);
+}
+
+static void write_camera_queries(struct pen_json *json)
+{
+    struct pen_param_table table = pen_camera_table();
+    for (uint32_t r = 0; r < table.count; r++) {
+        const struct pen_param *row = &table.rows[r];
+        bool orbit = row->applies == PEN_CAMERA_BIT(PEN_CAMERA_ORBIT);
+        write_query(json, orbit ? "camera.orbit." : "camera.", row->name,
+            orbit ? "Camera/properties/orbit/properties/" : "Camera/properties/", row->count > 1);
+    }
+}
+
+/* One query parameter per name; several methods may share it. */
+static void write_technique_queries(struct pen_json *json, const struct pen_catalogue *catalogue)
+{
+    for (uint32_t t = 0; t < catalogue->count; t++)
+        for (uint32_t r = 0; r < catalogue->items[t]->params.count; r++) {
+            const struct pen_param *row = &catalogue->items[t]->params.rows[r];
+            char text[160];
+            bool seen = false;
+            for (uint32_t before = 0; before < t; before++)
+                seen |= pen_param_find(catalogue->items[before]->params, row->name) != NULL;
+            if (seen)
+                continue;
+            pen_json_object(json, NULL);
+            snprintf(text, sizeof text, "params.%s", row->name);
+            pen_json_string(json, "name", text);
+            pen_json_string(json, "in", "query");
+            if (row->count > 1) {
+                pen_json_string(json, "style", "form");
+                pen_json_bool(json, "explode", false);
+            }
+            pen_json_object(json, "schema");
+            pen_json_array(json, "anyOf");
+            for (uint32_t other = t; other < catalogue->count; other++) {
+                if (!pen_param_find(catalogue->items[other]->params, row->name))
+                    continue;
+                snprintf(text, sizeof text, SCHEMA "Technique-%s/properties/params/properties/%s",
+                    catalogue->items[other]->name, row->name);
+                write_ref(json, NULL, text);
+            }
+            pen_json_end(json);
+            pen_json_end(json);
+            pen_json_end(json);
+        }
+}
+
+static void write_request_queries(struct pen_json *json, const struct pen_catalogue *catalogue)
+{
+    pen_json_object(json, NULL);
+    pen_json_string(json, "name", "technique");
+    pen_json_string(json, "in", "query");
+    write_ref(json, "schema", SCHEMA "TechniqueName");
+    pen_json_end(json);
+    write_technique_queries(json, catalogue);
+    write_queries(json, "", pen_request_table(), "RenderRequest/properties/");
+    write_queries(json, "", pen_delivery_table(), "RenderRequest/properties/");
+    write_camera_queries(json);
+    write_query(json, "light.", "type", "Light/properties/", false);
+    write_queries(json, "light.", pen_light_table(), "Light/properties/");
+    write_query(json, "light.texture.", "image", "LightTexture/properties/", false);
+    write_query(json, "light.texture.", "pattern", "LightTexture/properties/", false);
+    write_queries(json, "", pen_output_table(), "Output/properties/");
+    pen_json_object(json, NULL);
+    pen_json_string(json, "name", "request");
+    pen_json_string(json, "in", "query");
+    pen_json_string(json, "description", "A whole request as JSON, instead of the other keys.");
+    write_content(json, PEN_BODY_REQUEST);
+    pen_json_end(json);
+}
+
+static void write_parameters(
+    struct pen_json *json, const struct pen_route *route, const struct pen_catalogue *catalogue)
+{
+    static const char *const placeholders[] = {"{id}", "{name}"};
+    pen_json_array(json, "parameters");
+    for (int i = 0; i < 2; i++) {
+        if (!strstr(route->pattern, placeholders[i]))
+            continue;
+        pen_json_object(json, NULL);
+        pen_json_string(json, "name", i ? "name" : "id");
+        pen_json_string(json, "in", "path");
+        pen_json_bool(json, "required", true);
+        write_ref(json, "schema", i ? SCHEMA "TechniqueName" : SCHEMA "Id");
+        pen_json_end(json);
+    }
+    if (route->flags & PEN_ROUTE_PAGED) {
+        pen_json_raw(json, NULL,
+            "{\"name\":\"limit\",\"in\":\"query\",\"schema\":{\"type\":\"integer\",\"minimum\":1}"
+            "}");
+        pen_json_raw(json, NULL,
+            "{\"name\":\"after\",\"in\":\"query\",\"description\":\"The last "
+            "id of the page before.\",\"schema\":{\"$ref\":\"" SCHEMA "Id\"}}");
+    }
+    if (route->flags & PEN_ROUTE_QUERY)
+        write_request_queries(json, catalogue);
+    pen_json_end(json);
+}
+
+static void write_operation(
+    struct pen_json *json, const struct pen_route *route, const struct pen_catalogue *catalogue)
+{
+    char method[8] = "";
+    for (uint32_t i = 0; route->method[i] && i + 1 < sizeof method; i++)
+        method[i] = (char)(route->method[i] | 0x20);
+    pen_json_object(json, method);
+    pen_json_string(json, "operationId", route->operation);
+    pen_json_string(json, "summary", route->summary);
+    write_parameters(json, route, catalogue);
+    if (route->takes != PEN_BODY_NONE) {
+        pen_json_object(json, "requestBody");
+        pen_json_bool(json, "required", true);
+        write_content(json, route->takes);
+        pen_json_end(json);
+    }
+    pen_json_object(json, "responses");
+    if (route->gives == PEN_BODY_NONE)
+        write_response(json, "204", "Done.", PEN_BODY_NONE);
+    else
+        write_response(json, "200",
+            route->flags & PEN_ROUTE_CREATES ? "These bytes are stored already." : "The answer.",
+            route->gives);
+    if (route->flags & PEN_ROUTE_CREATES)
+        write_response(json, "201", "Stored; Location says where.", route->gives);
+    if (route->flags & PEN_ROUTE_CONDITIONAL)
+        write_response(
+            json, "304", "If-None-Match names the image that this request gives.", PEN_BODY_NONE);
+    write_ref(json, "default", "#/components/responses/Problem");
+    pen_json_end(json);
+    pen_json_end(json);
+}
+
+static void write_paths(struct pen_json *json, const struct pen_catalogue *catalogue)
+{
+    pen_json_object(json, "paths");
+    for (uint32_t r = 0; r < PEN_ROUTES; r++) {
+        const char *pattern = pen_routes[r].pattern;
+        if (r && !strcmp(pen_routes[r - 1].pattern, pattern))
+            continue;
+        pen_json_object(json, pattern);
+        for (uint32_t other = r; other < PEN_ROUTES; other++)
+            if (!strcmp(pen_routes[other].pattern, pattern))
+                write_operation(json, &pen_routes[other], catalogue);
+        pen_json_end(json);
+    }
+    pen_json_end(json);
+}
+
+char *pen_openapi_json(const struct pen_catalogue *catalogue, const char *version)
+{
+    struct pen_json json = {0};
+    pen_json_object(&json, NULL);
+    pen_json_string(&json, "openapi", "3.1.0");
+    pen_json_object(&json, "info");
+    pen_json_string(&json, "title", "penumbra");
+    pen_json_string(&json, "summary", "Renders glTF scenes with soft shadows.");
+    pen_json_string(&json, "version", version);
+    pen_json_end(&json);
+    write_paths(&json, catalogue);
+    pen_json_object(&json, "components");
+    pen_json_object(&json, "schemas");
+    pen_openapi_schemas(&json, catalogue);
+    pen_json_end(&json);
+    pen_json_object(&json, "responses");
+    pen_json_object(&json, "Problem");
+    pen_json_string(&json, "description", "What went wrong.");
+    pen_json_object(&json, "content");
+    write_media(&json, "application/problem+json", SCHEMA "Problem");
+    pen_json_end(&json);
+    pen_json_end(&json);
+    pen_json_end(&json);
+    pen_json_end(&json);
+    pen_json_end(&json);
+    return pen_json_finish(&json, NULL);
+}

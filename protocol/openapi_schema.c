@@ -1,0 +1,361 @@
+#include "protocol/openapi_schema.h"
+#include "protocol/request.h"
+#include <stdio.h>
+#include <string.h>
+
+#define SCHEMA "#/components/schemas/"
+#define ID_PATTERN "^[0-9a-f]{64}$"
+
+static void write_ref(struct pen_json *json, const char *key, const char *target)
+{
+    pen_json_object(json, key);
+    pen_json_string(json, "$ref", target);
+    pen_json_end(json);
+}
+
+static void write_strings(struct pen_json *json, const char *key, const char *const *strings)
+{
+    pen_json_array(json, key);
+    for (uint32_t i = 0; strings[i]; i++)
+        pen_json_string(json, NULL, strings[i]);
+    pen_json_end(json);
+}
+
+/* An object that takes no other keys, with its properties open. */
+static void open_object(struct pen_json *json, const char *key, const char *description)
+{
+    pen_json_object(json, key);
+    pen_json_string(json, "type", "object");
+    if (description)
+        pen_json_string(json, "description", description);
+    pen_json_bool(json, "additionalProperties", false);
+    pen_json_object(json, "properties");
+}
+
+static void close_object(struct pen_json *json)
+{
+    pen_json_end(json);
+    pen_json_end(json);
+}
+
+/* Type and range of one component. */
+static void write_component(struct pen_json *json, const struct pen_param *row)
+{
+    if (row->choices) {
+        pen_json_string(json, "type", "string");
+        write_strings(json, "enum", row->choices);
+    } else if (row->type == PEN_PARAM_FLAG)
+        pen_json_string(json, "type", "boolean");
+    else {
+        pen_json_string(json, "type", row->type == PEN_PARAM_FLOAT ? "number" : "integer");
+        pen_json_double(json, row->exclusive_min ? "exclusiveMinimum" : "minimum", row->min);
+        pen_json_double(json, "maximum", row->max);
+    }
+}
+
+static void write_row(struct pen_json *json, const struct pen_param *row)
+{
+    char description[512];
+    pen_json_object(json, row->name);
+    if (row->count > 1) {
+        pen_json_string(json, "type", "array");
+        pen_json_object(json, "items");
+        write_component(json, row);
+        pen_json_end(json);
+        pen_json_uint(json, "minItems", row->count);
+        pen_json_uint(json, "maxItems", row->count);
+    } else
+        write_component(json, row);
+    pen_json_row_default(json, "default", row);
+    snprintf(description, sizeof description, row->unit ? "%s Unit: %s." : "%s", row->help,
+        row->unit ? row->unit : "");
+    pen_json_string(json, "description", description);
+    if (row->unit)
+        pen_json_string(json, "x-unit", row->unit);
+    pen_json_end(json);
+}
+
+static void write_rows(struct pen_json *json, struct pen_param_table table)
+{
+    for (uint32_t r = 0; r < table.count; r++)
+        write_row(json, &table.rows[r]);
+}
+
+/* {"required": [a, b]}: both keys are there. */
+static void write_both(struct pen_json *json, const char *key, const char *a, const char *b)
+{
+    const char *const keys[] = {a, b, NULL};
+    pen_json_object(json, key);
+    write_strings(json, "required", keys);
+    pen_json_end(json);
+}
+
+/* "properties" that forbids the rows which the bit does not have. */
+static void forbid_rows(struct pen_json *json, struct pen_param_table table, uint32_t bit,
+    uint32_t except, const char *also)
+{
+    pen_json_object(json, "properties");
+    for (uint32_t r = 0; r < table.count; r++)
+        if (table.rows[r].applies && !(table.rows[r].applies & bit) &&
+            (!except || table.rows[r].applies != except))
+            pen_json_bool(json, table.rows[r].name, false);
+    if (also)
+        pen_json_bool(json, also, false);
+    pen_json_end(json);
+}
+
+static void write_technique_object(struct pen_json *json, const struct pen_technique_info *info)
+{
+    static const char *const required[] = {"name", NULL};
+    char key[64];
+    snprintf(key, sizeof key, "Technique-%s", info->name);
+    pen_json_object(json, key);
+    pen_json_string(json, "type", "object");
+    pen_json_string(json, "title", info->title);
+    pen_json_string(json, "description", info->summary);
+    write_strings(json, "required", required);
+    pen_json_bool(json, "additionalProperties", false);
+    pen_json_object(json, "properties");
+    pen_json_object(json, "name");
+    pen_json_string(json, "const", info->name);
+    pen_json_end(json);
+    open_object(json, "params", NULL);
+    write_rows(json, info->params);
+    close_object(json);
+    close_object(json);
+}
+
+static void write_techniques(struct pen_json *json, const struct pen_catalogue *catalogue)
+{
+    struct pen_request defaults;
+    char target[96];
+    pen_request_default(&defaults, catalogue);
+    pen_json_object(json, "TechniqueName");
+    pen_json_string(json, "type", "string");
+    pen_json_array(json, "enum");
+    for (uint32_t i = 0; i < catalogue->count; i++)
+        pen_json_string(json, NULL, catalogue->items[i]->name);
+    pen_json_end(json);
+    pen_json_string(json, "default", defaults.technique);
+    pen_json_end(json);
+
+    pen_json_object(json, "TechniqueObject");
+    pen_json_array(json, "oneOf");
+    for (uint32_t i = 0; i < catalogue->count; i++) {
+        snprintf(target, sizeof target, SCHEMA "Technique-%s", catalogue->items[i]->name);
+        write_ref(json, NULL, target);
+    }
+    pen_json_end(json);
+    pen_json_object(json, "discriminator");
+    pen_json_string(json, "propertyName", "name");
+    pen_json_object(json, "mapping");
+    for (uint32_t i = 0; i < catalogue->count; i++) {
+        snprintf(target, sizeof target, SCHEMA "Technique-%s", catalogue->items[i]->name);
+        pen_json_string(json, catalogue->items[i]->name, target);
+    }
+    pen_json_end(json);
+    pen_json_end(json);
+    pen_json_end(json);
+
+    pen_json_object(json, "Technique");
+    pen_json_string(json, "description", "A method's name, or its name and parameters.");
+    pen_json_array(json, "oneOf");
+    write_ref(json, NULL, SCHEMA "TechniqueName");
+    write_ref(json, NULL, SCHEMA "TechniqueObject");
+    pen_json_end(json);
+    pen_json_end(json);
+
+    for (uint32_t i = 0; i < catalogue->count; i++)
+        write_technique_object(json, catalogue->items[i]);
+}
+
+static void write_camera(struct pen_json *json)
+{
+    const uint32_t orbit = PEN_CAMERA_BIT(PEN_CAMERA_ORBIT);
+    const uint32_t look_at = PEN_CAMERA_BIT(PEN_CAMERA_LOOK_AT);
+    static const char *const eye[] = {"eye", NULL};
+    struct pen_param_table table = pen_camera_table();
+    open_object(json, "Camera",
+        "A point of view (eye), a camera of the scene (index) or an orbit around the centre of its "
+        "bounds; without any of them the bounds are framed.");
+    for (uint32_t r = 0; r < table.count; r++)
+        if (table.rows[r].applies != orbit)
+            write_row(json, &table.rows[r]);
+    open_object(json, "orbit", NULL);
+    for (uint32_t r = 0; r < table.count; r++)
+        if (table.rows[r].applies == orbit)
+            write_row(json, &table.rows[r]);
+    close_object(json);
+    pen_json_end(json);
+    pen_json_object(json, "dependentRequired");
+    for (uint32_t r = 0; r < table.count; r++)
+        if (table.rows[r].applies == look_at && strcmp(table.rows[r].name, "eye"))
+            write_strings(json, table.rows[r].name, eye);
+    pen_json_end(json);
+    pen_json_object(json, "dependentSchemas");
+    pen_json_object(json, "index");
+    forbid_rows(json, table, PEN_CAMERA_BIT(PEN_CAMERA_INDEX), orbit, "orbit");
+    pen_json_end(json);
+    pen_json_object(json, "orbit");
+    forbid_rows(json, table, orbit, 0, NULL);
+    pen_json_end(json);
+    pen_json_end(json);
+    pen_json_end(json);
+}
+
+static void write_texture(struct pen_json *json)
+{
+    open_object(json, "LightTexture", "What a rect light emits over its area; black cuts shapes.");
+    pen_json_object(json, "image");
+    pen_json_string(json, "type", "string");
+    pen_json_string(json, "pattern", ID_PATTERN);
+    pen_json_string(json, "description", "The id of an uploaded image.");
+    pen_json_end(json);
+    pen_json_object(json, "pattern");
+    pen_json_string(json, "type", "string");
+    write_strings(json, "enum", pen_pattern_names);
+    pen_json_end(json);
+    pen_json_end(json);
+    pen_json_uint(json, "minProperties", 1);
+    pen_json_uint(json, "maxProperties", 1);
+    pen_json_end(json);
+}
+
+static void write_light(struct pen_json *json)
+{
+    static const char *const type_key[] = {"type", NULL};
+    struct pen_param_table table = pen_light_table();
+    open_object(json, "Light", "A light; the rows that it takes depend on its type.");
+    pen_json_object(json, "type");
+    pen_json_string(json, "type", "string");
+    write_strings(json, "enum", pen_light_type_names);
+    pen_json_string(json, "default", pen_light_type_names[PEN_LIGHT_RECT]);
+    pen_json_end(json);
+    write_rows(json, table);
+    write_ref(json, "texture", SCHEMA "LightTexture");
+    pen_json_end(json);
+    write_both(json, "not", "power_w", "radiance");
+    pen_json_array(json, "allOf");
+    for (uint32_t type = 0; type < PEN_LIGHT_TYPES; type++) {
+        pen_json_object(json, NULL);
+        pen_json_object(json, "if");
+        pen_json_object(json, "properties");
+        pen_json_object(json, "type");
+        pen_json_string(json, "const", pen_light_type_names[type]);
+        pen_json_end(json);
+        pen_json_end(json);
+        if (type != PEN_LIGHT_RECT) /* the type when none is given */
+            write_strings(json, "required", type_key);
+        pen_json_end(json);
+        pen_json_object(json, "then");
+        forbid_rows(json, table, PEN_LIGHT_BIT(type), 0, type == PEN_LIGHT_RECT ? NULL : "texture");
+        pen_json_end(json);
+        pen_json_end(json);
+    }
+    pen_json_end(json);
+    pen_json_end(json);
+}
+
+static void write_request(struct pen_json *json)
+{
+    open_object(json, "RenderRequest", "Every key may be left out; {} gives a picture.");
+    write_ref(json, "technique", SCHEMA "Technique");
+    write_ref(json, "camera", SCHEMA "Camera");
+    pen_json_object(json, "lights");
+    pen_json_string(json, "type", "array");
+    pen_json_uint(json, "maxItems", PEN_MAX_LIGHTS);
+    write_ref(json, "items", SCHEMA "Light");
+    pen_json_string(json, "description",
+        "Left out: the scene's own lights, else one that suits its bounds. Empty: ambient only.");
+    pen_json_end(json);
+    write_rows(json, pen_request_table());
+    write_ref(json, "output", SCHEMA "Output");
+    write_rows(json, pen_delivery_table());
+    close_object(json);
+    open_object(json, "Output", NULL);
+    write_rows(json, pen_output_table());
+    close_object(json);
+}
+
+/* Documents that only come back: their shape, as JSON text. */
+static const char *const answers[][2] = {
+    {"Problem",
+        "{\"type\":\"object\",\"description\":\"RFC 9457.\",\"required\":[\"type\",\"title\","
+        "\"status\",\"detail\",\"retryable\"],\"properties\":{\"type\":{\"type\":\"string\"},"
+        "\"title\":{\"type\":\"string\"},\"status\":{\"type\":\"integer\"},\"detail\":{\"type\":"
+        "\"string\"},\"pointer\":{\"type\":\"string\",\"description\":\"RFC 6901 pointer to the "
+        "key "
+        "that is wrong.\"},\"retryable\":{\"type\":\"boolean\",\"description\":\"The same request "
+        "may succeed later.\"},\"request_id\":{\"type\":\"string\"}}}"},
+    {"Id", "{\"type\":\"string\",\"pattern\":\"" ID_PATTERN
+           "\",\"description\":\"SHA-256 of the uploaded bytes.\"}"},
+    {"Vector", "{\"type\":\"array\",\"items\":{\"type\":\"number\"},\"minItems\":3,"
+               "\"maxItems\":3}"},
+    {"Scene",
+        "{\"type\":\"object\",\"required\":[\"id\",\"triangles\"],\"properties\":{\"id\":{\"$ref\":"
+        "\"" SCHEMA
+        "Id\"},\"triangles\":{\"type\":\"integer\"},\"vertices\":{\"type\":\"integer\"},"
+        "\"primitives\":{\"type\":\"integer\"},\"instances\":{\"type\":\"integer\"},\"materials\":"
+        "{\"type\":\"integer\"},\"textures\":{\"type\":\"integer\"},\"images\":{\"type\":"
+        "\"integer\"},\"animations\":{\"type\":\"integer\"},\"source_bytes\":{\"type\":\"integer\"}"
+        ","
+        "\"stored_bytes\":{\"type\":\"integer\"},\"gpu_bytes\":{\"type\":\"integer\"},\"resident\":"
+        "{\"type\":\"boolean\"},\"stored_at\":{\"type\":\"string\",\"format\":\"date-time\"},"
+        "\"bounds\":{\"oneOf\":[{\"type\":\"null\"},{\"type\":\"object\",\"properties\":{\"min\":"
+        "{\"$ref\":\"" SCHEMA "Vector\"},\"max\":{\"$ref\":\"" SCHEMA "Vector\"}}}]},\"cameras\":"
+        "{\"type\":\"array\",\"items\":{\"type\":\"object\",\"properties\":{\"index\":{\"type\":"
+        "\"integer\"},\"name\":{\"type\":\"string\"},\"eye\":{\"$ref\":\"" SCHEMA "Vector\"},"
+        "\"target\":{\"$ref\":\"" SCHEMA "Vector\"},\"up\":{\"$ref\":\"" SCHEMA "Vector\"},"
+        "\"fov_y_deg\":{\"type\":\"number\"}}}},\"lights\":{\"type\":\"array\",\"items\":{\"type\":"
+        "\"object\",\"properties\":{\"name\":{\"type\":\"string\"},\"light\":{\"$ref\":\"" SCHEMA
+        "Light\"}}}},\"warnings\":{\"type\":\"array\",\"items\":{\"type\":\"string\"}}}}"},
+    {"SceneList", "{\"type\":\"object\",\"properties\":{\"scenes\":{\"type\":\"array\",\"items\":"
+                  "{\"$ref\":\"" SCHEMA "Scene\"}}}}"},
+    {"ImageInfo", "{\"type\":\"object\",\"properties\":{\"id\":{\"$ref\":\"" SCHEMA
+                  "Id\"},\"width\":{\"type\":\"integer\"},\"height\":{\"type\":\"integer\"},"
+                  "\"source_bytes\":{\"type\":\"integer\"},\"stored_bytes\":{\"type\":\"integer\"},"
+                  "\"stored_at\":{\"type\":\"string\",\"format\":\"date-time\"}}}"},
+    {"ImageList", "{\"type\":\"object\",\"properties\":{\"images\":{\"type\":\"array\",\"items\":"
+                  "{\"$ref\":\"" SCHEMA "ImageInfo\"}}}}"},
+    {"TechniqueInfo",
+        "{\"type\":\"object\",\"properties\":{\"name\":{\"$ref\":\"" SCHEMA
+        "TechniqueName\"},\"title\":{\"type\":\"string\"},\"summary\":{\"type\":\"string\"},"
+        "\"citation\":{\"type\":\"string\"},\"artefacts\":{\"type\":\"string\"},\"cost_class\":"
+        "{\"enum\":[\"cheap\",\"medium\",\"heavy\",\"reference\"]},\"textured\":{\"type\":"
+        "\"boolean\"},\"params\":{\"type\":\"array\",\"items\":{\"type\":\"object\"}}}}"},
+    {"TechniqueList", "{\"type\":\"object\",\"properties\":{\"techniques\":{\"type\":\"array\","
+                      "\"items\":{\"$ref\":\"" SCHEMA "TechniqueInfo\"}}}}"},
+    {"Record",
+        "{\"type\":\"object\",\"description\":\"How an image was made.\",\"required\":[\"scene\","
+        "\"request\",\"warnings\",\"device\"],\"properties\":{\"request_id\":{\"type\":\"string\"},"
+        "\"scene\":{\"$ref\":\"" SCHEMA "Id\"},\"request\":{\"$ref\":\"" SCHEMA "RenderRequest\"},"
+        "\"image\":{\"type\":\"object\",\"properties\":{\"href\":{\"type\":\"string\"},\"etag\":"
+        "{\"type\":\"string\"},\"type\":{\"type\":\"string\"},\"width\":{\"type\":\"integer\"},"
+        "\"height\":{\"type\":\"integer\"},\"bytes\":{\"type\":\"integer\"}}},\"warnings\":{"
+        "\"type\":"
+        "\"array\",\"items\":{\"type\":\"string\"}},\"device\":{\"type\":\"object\",\"properties\":"
+        "{\"renderer\":{\"type\":\"string\"},\"version\":{\"type\":\"string\"},\"platform\":{"
+        "\"type\":"
+        "\"string\"},\"software\":{\"type\":\"boolean\"}}},\"cache\":{\"type\":\"object\","
+        "\"properties\":{\"result\":{\"type\":\"boolean\"},\"scene_resident\":{\"type\":"
+        "\"boolean\"},"
+        "\"shadow_inputs_reused\":{\"type\":\"boolean\"}}},\"total_ms\":{\"type\":\"number\"},"
+        "\"stages_ms\":{\"type\":\"object\",\"additionalProperties\":{\"type\":\"number\"}},"
+        "\"passes\":{\"type\":\"array\",\"items\":{\"type\":\"object\",\"properties\":{\"name\":"
+        "{\"type\":\"string\"},\"stage\":{\"type\":\"string\"},\"count\":{\"type\":\"integer\"},"
+        "\"ms\":{\"type\":\"number\"}}}},\"pixels\":{\"type\":\"object\",\"additionalProperties\":"
+        "{\"type\":\"integer\"}},\"triangles_drawn\":{\"type\":\"integer\"},\"gpu_bytes\":{"
+        "\"type\":"
+        "\"integer\"}}}"},
+};
+
+void pen_openapi_schemas(struct pen_json *json, const struct pen_catalogue *catalogue)
+{
+    write_request(json);
+    write_techniques(json, catalogue);
+    write_camera(json);
+    write_light(json);
+    write_texture(json);
+    for (uint32_t i = 0; i < sizeof answers / sizeof *answers; i++)
+        pen_json_raw(json, answers[i][0], answers[i][1]);
+}

@@ -1,0 +1,310 @@
+#include "renderer/blob/builder.h"
+#include "renderer/blob/check.h"
+#include "renderer/blob/geometry.h"
+#include <float.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+#define BOUND_BUDGET (64u << 20) /* vertices transformed for tight world bounds */
+
+struct array {
+    char *data;
+    size_t bytes, capacity;
+};
+
+struct psc_builder {
+    struct array sections[PSC_SECTIONS];
+    uint32_t animations;
+    uint32_t lost_instances; /* of primitives that do not exist, or with non-finite transforms */
+};
+
+static void *append(struct array *array, const void *data, size_t bytes)
+{
+    if (array->capacity - array->bytes < bytes) {
+        array->capacity = array->bytes + bytes + array->capacity / 2 + 256;
+        array->data = psc_reallocate(array->data, array->capacity, 1);
+    }
+    char *at = array->data + array->bytes;
+    if (data)
+        memcpy(at, data, bytes);
+    array->bytes += bytes;
+    return at;
+}
+
+static uint32_t append_item(struct array *array, const void *item, size_t bytes)
+{
+    append(array, item, bytes);
+    return (uint32_t)(array->bytes / bytes - 1);
+}
+
+struct psc_builder *psc_builder_create(void)
+{
+    struct psc_builder *builder = psc_allocate(1, sizeof *builder);
+    memset(builder, 0, sizeof *builder);
+    return builder;
+}
+
+void psc_builder_destroy(struct psc_builder *builder)
+{
+    if (!builder)
+        return;
+    for (int i = 0; i < PSC_SECTIONS; i++)
+        free(builder->sections[i].data);
+    free(builder);
+}
+
+uint32_t psc_builder_add_material(struct psc_builder *builder, const struct psc_material *material)
+{
+    return append_item(&builder->sections[PSC_MATERIALS], material, sizeof *material);
+}
+
+uint32_t psc_builder_add_texture(struct psc_builder *builder, const struct psc_texture *texture)
+{
+    return append_item(&builder->sections[PSC_TEXTURES], texture, sizeof *texture);
+}
+
+uint32_t psc_builder_add_image(
+    struct psc_builder *builder, uint32_t width, uint32_t height, bool srgb, const uint8_t *rgba)
+{
+    struct array *texels = &builder->sections[PSC_TEXELS];
+    struct psc_image image = {.width = width,
+        .height = height,
+        .levels = mip_levels(width, height),
+        .srgb = srgb,
+        .first_byte = texels->bytes};
+    uint8_t *chain = append(texels, NULL, mip_chain_bytes(width, height));
+    memcpy(chain, rgba, 4 * (size_t)width * height);
+    psc_make_mips(chain, width, height, srgb);
+    return append_item(&builder->sections[PSC_IMAGES], &image, sizeof image);
+}
+
+uint32_t psc_builder_add_light(struct psc_builder *builder, const struct psc_light *light)
+{
+    struct psc_light copy = *light;
+    copy.name[sizeof copy.name - 1] = 0;
+    return append_item(&builder->sections[PSC_LIGHTS], &copy, sizeof copy);
+}
+
+uint32_t psc_builder_add_camera(struct psc_builder *builder, const struct psc_camera *camera)
+{
+    struct psc_camera copy = *camera;
+    copy.name[sizeof copy.name - 1] = 0;
+    return append_item(&builder->sections[PSC_CAMERAS], &copy, sizeof copy);
+}
+
+void psc_builder_add_warning(struct psc_builder *builder, const char *format, ...)
+{
+    char text[512];
+    va_list args;
+    va_start(args, format);
+    vsnprintf(text, sizeof text, format, args);
+    va_end(args);
+    append(&builder->sections[PSC_WARNINGS], text, strlen(text) + 1);
+}
+
+void psc_builder_set_animations(struct psc_builder *builder, uint32_t count)
+{
+    builder->animations = count;
+}
+
+static int16_t snorm16(float x)
+{
+    return (int16_t)lrintf(fminf(fmaxf(x, -1), 1) * 32767);
+}
+
+static void append_vertices(struct psc_builder *builder, const struct geometry *g)
+{
+    append(&builder->sections[PSC_POSITIONS], g->positions, g->vertex_count * sizeof *g->positions);
+    struct psc_attributes *attributes =
+        append(&builder->sections[PSC_ATTRIBUTES], NULL, g->vertex_count * sizeof *attributes);
+    for (uint32_t i = 0; i < g->vertex_count; i++) {
+        struct psc_attributes *a = &attributes[i];
+        memset(a, 0, sizeof *a);
+        for (int k = 0; k < 3; k++)
+            a->normal[k] = snorm16(g->normals[i][k]);
+        for (int k = 0; g->tangents && k < 4; k++)
+            a->tangent[k] = snorm16(g->tangents[i][k]);
+        memcpy(a->uv, g->uv[i], sizeof a->uv);
+        memcpy(a->color, g->colors[i], sizeof a->color);
+    }
+}
+
+static uint32_t append_meshlets(struct psc_builder *builder, const struct geometry *g,
+    const struct psc_mesh *mesh, uint32_t first_index)
+{
+    uint32_t count = 0;
+    for (uint32_t at = 0; at < g->index_count; count++) {
+        uint32_t left = (g->index_count - at) / 3;
+        uint32_t triangles = left < PSC_MESHLET_TRIANGLES ? left : PSC_MESHLET_TRIANGLES;
+        if (mesh->meshlet_triangles)
+            triangles = mesh->meshlet_triangles[count];
+        struct psc_meshlet m = {.first_index = first_index + at, .index_count = 3 * triangles};
+        psc_meshlet_bound(&m, (const float(*)[3])g->positions, g->indices + at);
+        append(&builder->sections[PSC_MESHLETS], &m, sizeof m);
+        at += m.index_count;
+    }
+    return count;
+}
+
+bool psc_builder_add_mesh(struct psc_builder *builder, const struct psc_mesh *mesh,
+    uint32_t *primitive, struct pen_error *error)
+{
+    struct geometry g;
+    if (!psc_geometry_create(&g, mesh, error))
+        return false;
+    struct array *s = builder->sections;
+    size_t first_vertex = s[PSC_POSITIONS].bytes / 12, first_index = s[PSC_INDICES].bytes / 4;
+    if (first_vertex + g.vertex_count > UINT32_MAX ||
+        first_index + g.index_count > PSC_MAX_INDICES) {
+        psc_geometry_finish(&g);
+        return pen_fail(error, PEN_UNPROCESSABLE, "", "The scene has more than 2^31 indices.");
+    }
+    struct psc_primitive p = {.first_index = (uint32_t)first_index,
+        .index_count = g.index_count,
+        .first_vertex = (uint32_t)first_vertex,
+        .vertex_count = g.vertex_count,
+        .first_meshlet = (uint32_t)(s[PSC_MESHLETS].bytes / sizeof(struct psc_meshlet)),
+        .material = mesh->material};
+    for (uint32_t i = 0; i < g.vertex_count; i++)
+        for (int k = 0; k < 3; k++) {
+            float x = g.positions[i][k];
+            p.bounds_min[k] = !i || x < p.bounds_min[k] ? x : p.bounds_min[k];
+            p.bounds_max[k] = !i || x > p.bounds_max[k] ? x : p.bounds_max[k];
+        }
+    if (psc_is_watertight((const float(*)[3])g.positions, g.vertex_count, g.indices, g.index_count))
+        p.flags |= PSC_WATERTIGHT;
+
+    append_vertices(builder, &g);
+    p.meshlet_count = append_meshlets(builder, &g, mesh, p.first_index);
+    uint32_t *indices = append(&s[PSC_INDICES], NULL, g.index_count * sizeof *indices);
+    for (uint32_t i = 0; i < g.index_count; i++)
+        indices[i] = p.first_vertex + g.indices[i];
+    *primitive = append_item(&s[PSC_PRIMITIVES], &p, sizeof p);
+    psc_geometry_finish(&g);
+    return true;
+}
+
+void psc_builder_add_instance(
+    struct psc_builder *builder, uint32_t primitive, const float world[12])
+{
+    size_t primitives = builder->sections[PSC_PRIMITIVES].bytes / sizeof(struct psc_primitive);
+    if (primitive >= primitives || !all_finite(world, 12)) {
+        builder->lost_instances++;
+        return;
+    }
+    struct psc_instance instance = {.primitive = primitive};
+    memcpy(instance.world, world, sizeof instance.world);
+    if (world_determinant(world) < 0)
+        instance.flags = PSC_MIRRORED;
+    append(&builder->sections[PSC_INSTANCES], &instance, sizeof instance);
+}
+
+struct psc_material psc_material_default(void)
+{
+    const struct psc_texture_ref none = {.texture = -1, .transform = {1, 0, 0, 0, 1, 0}};
+    return (struct psc_material){.base_color = {1, 1, 1, 1},
+        .roughness = 1,
+        .specular = {1, 1, 1},
+        .glossiness = 1,
+        .normal_scale = 1,
+        .occlusion_strength = 1,
+        .alpha_cutoff = 0.5f,
+        .base = none,
+        .surface = none,
+        .normal = none,
+        .occlusion = none,
+        .emission = none};
+}
+
+static void grow_bounds(struct psc_header *header, const float m[12], double x, double y, double z)
+{
+    for (int k = 0; k < 3; k++) {
+        const float *row = m + 4 * k;
+        float w = (float)(row[0] * x + row[1] * y + row[2] * z + row[3]);
+        header->bounds_min[k] = fminf(header->bounds_min[k], w);
+        header->bounds_max[k] = fmaxf(header->bounds_max[k], w);
+    }
+}
+
+/* Tight around the vertices while the budget lasts, then around the instances' boxes. */
+static void world_bounds(struct psc_builder *builder, struct psc_header *header)
+{
+    const float(*positions)[3] = (const float(*)[3])builder->sections[PSC_POSITIONS].data;
+    const struct psc_primitive *primitives =
+        (const struct psc_primitive *)builder->sections[PSC_PRIMITIVES].data;
+    const struct array *list = &builder->sections[PSC_INSTANCES];
+    uint64_t budget = BOUND_BUDGET;
+    for (int k = 0; k < 3; k++) {
+        header->bounds_min[k] = FLT_MAX;
+        header->bounds_max[k] = -FLT_MAX;
+    }
+    for (size_t i = 0; i < list->bytes / sizeof(struct psc_instance); i++) {
+        const struct psc_instance *instance = (const struct psc_instance *)list->data + i;
+        const struct psc_primitive *p = &primitives[instance->primitive];
+        if (!p->index_count)
+            continue;
+        header->triangles += p->index_count / 3;
+        if (p->vertex_count <= budget) {
+            budget -= p->vertex_count;
+            for (uint32_t v = 0; v < p->vertex_count; v++) {
+                const float *q = positions[p->first_vertex + v];
+                grow_bounds(header, instance->world, q[0], q[1], q[2]);
+            }
+        } else {
+            for (int c = 0; c < 8; c++)
+                grow_bounds(header, instance->world, c & 1 ? p->bounds_max[0] : p->bounds_min[0],
+                    c & 2 ? p->bounds_max[1] : p->bounds_min[1],
+                    c & 4 ? p->bounds_max[2] : p->bounds_min[2]);
+        }
+    }
+}
+
+bool psc_builder_finish(struct psc_builder *builder, const uint8_t source[PEN_ID_BYTES],
+    void **data, size_t *bytes, struct pen_error *error)
+{
+    *data = NULL;
+    *bytes = 0;
+    if (!builder->sections[PSC_MATERIALS].bytes) {
+        struct psc_material material = psc_material_default();
+        psc_builder_add_material(builder, &material);
+    }
+    if (builder->lost_instances)
+        return pen_fail(error, PEN_UNPROCESSABLE, "",
+            "%u instances have a transform that is not finite.", builder->lost_instances);
+    struct psc_header header = {.magic = PSC_MAGIC,
+        .version = PSC_VERSION,
+        .header_bytes = sizeof header,
+        .animations = builder->animations};
+    memcpy(header.source, source, sizeof header.source);
+    world_bounds(builder, &header);
+    if (!all_finite(header.bounds_min, 6))
+        return pen_fail(error, PEN_UNPROCESSABLE, "", "The scene's bounds are not finite.");
+
+    uint64_t end = sizeof header;
+    for (int i = 0; i < PSC_SECTIONS; i++) {
+        header.sections[i].offset = (end + 63) / 64 * 64;
+        header.sections[i].bytes = builder->sections[i].bytes;
+        end = header.sections[i].offset + header.sections[i].bytes;
+    }
+    header.file_bytes = end;
+    char *file = psc_allocate(end, 1);
+    memset(file, 0, header.sections[0].offset);
+    memcpy(file, &header, sizeof header);
+    for (int i = 0; i < PSC_SECTIONS; i++) {
+        size_t at = header.sections[i].offset, size = header.sections[i].bytes;
+        size_t next = i + 1 < PSC_SECTIONS ? header.sections[i + 1].offset : end;
+        if (size)
+            memcpy(file + at, builder->sections[i].data, size);
+        memset(file + at + size, 0, next - at - size);
+    }
+    /* What we write is what we read: a builder fed with out-of-range numbers fails here, once. */
+    struct psc_scene scene;
+    if (!psc_open_memory(file, end, &scene, error)) {
+        free(file);
+        return false;
+    }
+    *data = file;
+    *bytes = end;
+    return true;
+}

@@ -1,0 +1,41 @@
+/* What the builder does to one mesh; private to renderer/blob. */
+#pragma once
+#include "renderer/blob/builder.h"
+
+/* A mesh on its way into the builder: arrays of its own, indices relative to it. */
+struct geometry {
+    float (*positions)[3];
+    float (*normals)[3];  /* unit */
+    float (*tangents)[4]; /* unit, w +-1; NULL: none */
+    float (*uv)[2][2];
+    uint8_t (*colors)[4];
+    uint32_t vertex_count, vertex_capacity;
+    uint32_t *indices;
+    uint32_t index_count;
+};
+
+/* Never return NULL: out of memory aborts. */
+void *psc_allocate(size_t count, size_t item_bytes);
+void *psc_reallocate(void *memory, size_t count, size_t item_bytes);
+
+/* Unit normal in double precision; false for a triangle without area. */
+bool psc_triangle_normal(const float a[3], const float b[3], const float c[3], double normal[3]);
+
+/* Copies and checks `mesh`; generates flat normals (which split every vertex) and tangents. */
+bool psc_geometry_create(
+    struct geometry *geometry, const struct psc_mesh *mesh, struct pen_error *error);
+void psc_geometry_finish(struct geometry *geometry);
+
+/* Fills geometry->tangents from uv set 0; vertices used with both handednesses are split. */
+void psc_geometry_make_tangents(struct geometry *geometry);
+
+/* Bounding sphere and normal cone of the triangles in m's index range; conservative. */
+void psc_meshlet_bound(struct psc_meshlet *m, const float (*positions)[3], const uint32_t *indices);
+
+/* Whether every edge, vertices joined by position, is shared by exactly two triangles that run
+ * through it in opposite directions. Triangles without three distinct corners are ignored. */
+bool psc_is_watertight(const float (*positions)[3], uint32_t vertex_count, const uint32_t *indices,
+    uint32_t index_count);
+
+/* Fills the levels after the first of an RGBA8 chain that starts at `texels`. */
+void psc_make_mips(uint8_t *texels, uint32_t width, uint32_t height, bool srgb);

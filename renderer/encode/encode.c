@@ -1,0 +1,162 @@
+#include "renderer/encode/encode.h"
+#include "renderer/encode/oiio_shim.h"
+#include "renderer/encode/pixels.h"
+#include "renderer/encode/png_fast.h"
+#include "renderer/encode/webp.h"
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+void pen_bytes_finish(struct pen_bytes *bytes)
+{
+    free(bytes->data);
+    *bytes = (struct pen_bytes){0};
+}
+
+static uint32_t bits_of(const struct pen_output *output)
+{
+    if (output->bit_depth)
+        return output->bit_depth;
+    return output->format == PEN_EXR ? 16 : 8;
+}
+
+enum pen_pixel pen_encode_wants(const struct pen_output *output)
+{
+    bool metres = output->layer == PEN_LAYER_DEPTH || output->layer == PEN_LAYER_POSITION;
+    if (output->format == PEN_EXR)
+        return bits_of(output) == 32 || (output->bit_depth == 0 && metres) ? PEN_PIXEL_RGBA32F
+                                                                           : PEN_PIXEL_RGBA16F;
+    return bits_of(output) == 16 ? PEN_PIXEL_RGBA32F : PEN_PIXEL_RGBA8;
+}
+
+struct source {
+    const struct pen_frame *frame;
+    uint32_t plane_count;
+    uint32_t channels[PEN_LAYERS]; /* written of each plane */
+    enum pixels_sample stored[PEN_LAYERS];
+    uint32_t total; /* channels of the file */
+};
+
+static size_t sample_bytes(enum pixels_sample sample)
+{
+    return sample == PIXELS_U8 ? 1 : sample == PIXELS_U16 ? 2 : 4;
+}
+
+static void fill_rows(void *user, uint32_t first, uint32_t count, void *out)
+{
+    const struct source *source = user;
+    uint32_t width = source->frame->width;
+    for (uint32_t y = 0; y < count; y++) {
+        size_t at = (size_t)y * width * source->total;
+        for (uint32_t p = 0; p < source->plane_count; p++) {
+            pixels_row(&source->frame->planes[p], width, first + y, source->channels[p],
+                source->stored[p], source->total,
+                (uint8_t *)out + at * sample_bytes(source->stored[p]));
+            at += source->channels[p];
+        }
+    }
+}
+
+static bool is_vector(const char *plane)
+{
+    return !strcmp(plane, "normal") || !strcmp(plane, "position");
+}
+
+static void name_channels(
+    const struct pen_plane *plane, uint32_t channels, bool several, char (*names)[32])
+{
+    const char *letters = channels == 1 ? (!strcmp(plane->name, "depth") ? "Z" : "Y")
+                          : several && is_vector(plane->name) ? "XYZW"
+                                                              : "RGBA";
+    bool prefix = several && strcmp(plane->name, "beauty") != 0;
+    for (uint32_t c = 0; c < channels; c++)
+        snprintf(names[c], sizeof names[c], "%.*s%s%c", (int)sizeof plane->name,
+            prefix ? plane->name : "", prefix ? "." : "", letters[c]);
+}
+
+static bool encode_exr(const struct pen_frame *frame, const struct pen_output *output,
+    struct oiio_file *file, struct pen_bytes *bytes, struct pen_error *error)
+{
+    struct source source = {.frame = frame, .plane_count = frame->plane_count};
+    for (uint32_t p = 0; p < frame->plane_count; p++) {
+        const struct pen_plane *plane = &frame->planes[p];
+        bool wide = output->bit_depth == 32 ||
+                    (output->bit_depth == 0 && plane->pixel == PEN_PIXEL_RGBA32F);
+        source.channels[p] = plane->channels;
+        source.stored[p] = wide ? PIXELS_FLOAT : PIXELS_HALF;
+        name_channels(plane, plane->channels, frame->plane_count > 1, &file->names[source.total]);
+        for (uint32_t c = 0; c < plane->channels; c++)
+            file->stored[source.total + c] = source.stored[p];
+        source.total += plane->channels;
+    }
+    file->extension = "exr";
+    file->compression = "zip";
+    file->sample = PIXELS_FLOAT;
+    file->channels = source.total;
+    return oiio_write(file, fill_rows, &source, bytes, error);
+}
+
+static bool encode_integers(const struct pen_frame *frame, const struct pen_output *output,
+    struct oiio_file *file, struct pen_bytes *bytes, struct pen_error *error)
+{
+    char compression[24];
+    struct source source = {.frame = frame, .plane_count = 1};
+    uint32_t channels = frame->planes[0].channels;
+    if (output->format == PEN_TIFF) {
+        file->extension = "tif";
+        snprintf(compression, sizeof compression, "zip");
+    } else {
+        file->extension = "jpg";
+        snprintf(compression, sizeof compression, "jpeg:%u", output->quality);
+        channels = channels == 4 ? 3 : channels;
+    }
+    file->attributes_as_description = true;
+    file->compression = compression;
+    file->sample = bits_of(output) == 16 ? PIXELS_U16 : PIXELS_U8;
+    file->channels = source.total = source.channels[0] = channels;
+    source.stored[0] = file->sample;
+    return oiio_write(file, fill_rows, &source, bytes, error);
+}
+
+static bool is_sound(const struct pen_frame *frame, const struct pen_output *output)
+{
+    if (!frame->width || !frame->height || !frame->plane_count || frame->plane_count > PEN_LAYERS)
+        return false;
+    for (uint32_t p = 0; p < frame->plane_count; p++) {
+        const struct pen_plane *plane = &frame->planes[p];
+        if (!plane->data || plane->pixel > PEN_PIXEL_RGBA32F ||
+            (plane->channels != 1 && plane->channels != 3 && plane->channels != 4) ||
+            !memchr(plane->name, 0, sizeof plane->name))
+            return false;
+    }
+    uint32_t bits = bits_of(output);
+    switch (output->format) {
+    case PEN_PNG:
+    case PEN_TIFF:
+        return bits == 8 || bits == 16;
+    case PEN_EXR:
+        return bits == 16 || bits == 32;
+    default:
+        return bits == 8;
+    }
+}
+
+bool pen_encode(const struct pen_frame *frame, const struct pen_output *output,
+    const char *const *attributes, uint32_t attribute_count, struct pen_bytes *bytes,
+    struct pen_error *error)
+{
+    *bytes = (struct pen_bytes){0};
+    if (output->format >= PEN_FORMATS || !is_sound(frame, output))
+        return pen_fail(error, PEN_INTERNAL, "", "A frame of this kind cannot be encoded.");
+    if (output->format == PEN_PNG)
+        return png_fast_encode(frame, bits_of(output), attributes, attribute_count, bytes, error);
+    if (output->format == PEN_WEBP)
+        return webp_encode(frame, output->quality, bytes, error);
+    struct oiio_file file = {.width = frame->width,
+        .height = frame->height,
+        .attributes = attributes,
+        .attribute_count = attribute_count};
+    if (output->format == PEN_EXR)
+        return encode_exr(frame, output, &file, bytes, error);
+    return encode_integers(frame, output, &file, bytes, error);
+}

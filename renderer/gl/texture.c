@@ -1,0 +1,128 @@
+#include "renderer/gl/texture.h"
+#include <assert.h>
+#include <string.h>
+
+static uint32_t texel_bytes(GLenum format)
+{
+    switch (format) {
+    case GL_R8:
+    case GL_R8UI:
+        return 1;
+    case GL_RG8:
+    case GL_R16F:
+    case GL_R16UI:
+        return 2;
+    case GL_RG32F:
+    case GL_RG32UI:
+    case GL_RGBA16F:
+    case GL_RGBA16:
+    case GL_RGBA16UI:
+        return 8;
+    case GL_RGBA32F:
+    case GL_RGBA32UI:
+        return 16;
+    default:
+        return 4;
+    }
+}
+
+struct gl_texture gl_texture_create(
+    GLenum format, uint32_t width, uint32_t height, uint32_t layers, uint32_t levels)
+{
+    uint32_t side = width > height ? width : height, chain = 1;
+    while (side >> chain)
+        chain++;
+    struct gl_texture t = {.target = layers ? GL_TEXTURE_2D_ARRAY : GL_TEXTURE_2D,
+        .format = format,
+        .width = width,
+        .height = height,
+        .layers = layers,
+        .levels = levels && levels < chain ? levels : chain};
+    gl.CreateTextures(t.target, 1, &t.name);
+    GLsizei n = (GLsizei)t.levels, w = (GLsizei)width, h = (GLsizei)height;
+    if (layers)
+        gl.TextureStorage3D(t.name, n, format, w, h, (GLsizei)layers);
+    else
+        gl.TextureStorage2D(t.name, n, format, w, h);
+    gl.TextureParameteri(t.name, GL_TEXTURE_MIN_FILTER,
+        t.levels > 1 ? GL_NEAREST_MIPMAP_NEAREST : GL_NEAREST);
+    gl.TextureParameteri(t.name, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
+    gl.TextureParameteri(t.name, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
+    gl.TextureParameteri(t.name, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
+    for (uint32_t l = 0; l < t.levels; l++) {
+        uint64_t lw = width >> l ? width >> l : 1, lh = height >> l ? height >> l : 1;
+        t.bytes += lw * lh * (layers ? layers : 1) * texel_bytes(format);
+    }
+    return t;
+}
+
+void gl_texture_destroy(struct gl_texture *texture)
+{
+    if (texture->name)
+        gl.DeleteTextures(1, &texture->name);
+    memset(texture, 0, sizeof *texture);
+}
+
+bool gl_texture_fit(struct gl_texture *t, GLenum format, uint32_t width, uint32_t height,
+    uint32_t layers, uint32_t levels)
+{
+    if (t->name && t->format == format && t->width == width && t->height == height &&
+        t->layers == layers && (!levels || t->levels == levels))
+        return false;
+    gl_texture_destroy(t);
+    *t = gl_texture_create(format, width, height, layers, levels);
+    return true;
+}
+
+GLuint gl_framebuffer_create(
+    const struct gl_texture *const *colors, uint32_t count, const struct gl_texture *depth)
+{
+    GLuint name;
+    GLenum buffers[8];
+    assert(count <= 8);
+    gl.CreateFramebuffers(1, &name);
+    for (uint32_t i = 0; i < count; i++) {
+        buffers[i] = GL_COLOR_ATTACHMENT0 + i;
+        gl.NamedFramebufferTexture(name, buffers[i], colors[i]->name, 0);
+    }
+    gl.NamedFramebufferDrawBuffers(name, (GLsizei)count, buffers);
+    if (!count)
+        gl.NamedFramebufferReadBuffer(name, GL_NONE);
+    if (depth)
+        gl.NamedFramebufferTexture(name, GL_DEPTH_ATTACHMENT, depth->name, 0);
+    return name;
+}
+
+void gl_samplers_init(struct gl_samplers *samplers)
+{
+    static const struct {
+        GLint min, mag, wrap, compare;
+    } kinds[GL_SAMPLER_KINDS] = {
+        [GL_SAMPLE_NEAREST] = {GL_NEAREST, GL_NEAREST, GL_CLAMP_TO_EDGE, 0},
+        [GL_SAMPLE_LINEAR] = {GL_LINEAR, GL_LINEAR, GL_CLAMP_TO_EDGE, 0},
+        [GL_SAMPLE_TRILINEAR] = {GL_LINEAR_MIPMAP_LINEAR, GL_LINEAR, GL_CLAMP_TO_EDGE, 0},
+        [GL_SAMPLE_NEAREST_BORDER] = {GL_NEAREST, GL_NEAREST, GL_CLAMP_TO_BORDER, 0},
+        [GL_SAMPLE_COMPARE_NEAREST] = {GL_NEAREST, GL_NEAREST, GL_CLAMP_TO_BORDER, 1},
+        [GL_SAMPLE_COMPARE_LINEAR] = {GL_LINEAR, GL_LINEAR, GL_CLAMP_TO_BORDER, 1},
+    };
+    static const float border[4] = {1, 1, 1, 1};
+    gl.CreateSamplers(GL_SAMPLER_KINDS, samplers->names);
+    for (int i = 0; i < GL_SAMPLER_KINDS; i++) {
+        GLuint s = samplers->names[i];
+        gl.SamplerParameteri(s, GL_TEXTURE_MIN_FILTER, kinds[i].min);
+        gl.SamplerParameteri(s, GL_TEXTURE_MAG_FILTER, kinds[i].mag);
+        gl.SamplerParameteri(s, GL_TEXTURE_WRAP_S, kinds[i].wrap);
+        gl.SamplerParameteri(s, GL_TEXTURE_WRAP_T, kinds[i].wrap);
+        gl.SamplerParameterfv(s, GL_TEXTURE_BORDER_COLOR, border);
+        if (kinds[i].compare) {
+            gl.SamplerParameteri(s, GL_TEXTURE_COMPARE_MODE, GL_COMPARE_REF_TO_TEXTURE);
+            gl.SamplerParameteri(s, GL_TEXTURE_COMPARE_FUNC, GL_LEQUAL);
+        }
+    }
+}
+
+void gl_samplers_finish(struct gl_samplers *samplers)
+{
+    gl.DeleteSamplers(GL_SAMPLER_KINDS, samplers->names);
+    memset(samplers, 0, sizeof *samplers);
+}

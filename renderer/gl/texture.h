@@ -1,0 +1,40 @@
+/* Textures and framebuffers as values with a size, so that budgets can be kept. */
+#pragma once
+#include "renderer/gl/gl.h"
+#include <stdint.h>
+
+struct gl_texture {
+    GLuint name; /* 0: none */
+    GLenum target, format;
+    uint32_t width, height, layers, levels;
+    uint64_t bytes;
+};
+
+/* GL_TEXTURE_2D (layers 0) or GL_TEXTURE_2D_ARRAY, immutable. levels 0: the whole chain. Sampling
+ * state of the texture itself: nearest, clamped; use gl_sampler for anything else. */
+struct gl_texture gl_texture_create(
+    GLenum format, uint32_t width, uint32_t height, uint32_t layers, uint32_t levels);
+void gl_texture_destroy(struct gl_texture *texture);
+
+/* Makes *texture be of this shape, reusing it when it already is. True when it was made anew. */
+bool gl_texture_fit(struct gl_texture *texture, GLenum format, uint32_t width, uint32_t height,
+    uint32_t layers, uint32_t levels);
+
+/* A framebuffer with these colour attachments (level 0, or one layer of an array when layer >= 0). */
+GLuint gl_framebuffer_create(const struct gl_texture *const *colors, uint32_t count,
+    const struct gl_texture *depth);
+
+enum gl_sampler_kind {
+    GL_SAMPLE_NEAREST,        /* clamp */
+    GL_SAMPLE_LINEAR,         /* clamp, no mips */
+    GL_SAMPLE_TRILINEAR,      /* clamp, mips */
+    GL_SAMPLE_NEAREST_BORDER, /* border 1: outside a depth map nothing occludes */
+    GL_SAMPLE_COMPARE_NEAREST,/* <=, border 1 */
+    GL_SAMPLE_COMPARE_LINEAR, /* <=, border 1 */
+    GL_SAMPLER_KINDS
+};
+struct gl_samplers {
+    GLuint names[GL_SAMPLER_KINDS];
+};
+void gl_samplers_init(struct gl_samplers *samplers);
+void gl_samplers_finish(struct gl_samplers *samplers);

@@ -1,0 +1,46 @@
+#include "renderer/passes/passes.h"
+#include <stdio.h>
+
+static bool build(struct technique_run *run, const struct shadow_key *key,
+    struct shadow_input *input, struct pen_error *error)
+{
+    const struct shadow_input *map = pass_depth_map(run, key->size, error);
+    if (!map)
+        return false;
+    uint32_t side = key->size > 1 ? key->size / 2 : 1;
+    struct gl_texture *pyramid = &input->textures[0];
+    *pyramid = gl_texture_create(GL_RG32F, side, side, 0, 0);
+    GLuint framebuffer;
+    gl.CreateFramebuffers(1, &framebuffer);
+    bool ok = true;
+    for (uint32_t level = 0; ok && level < pyramid->levels; level++) {
+        gl.NamedFramebufferTexture(
+            framebuffer, GL_COLOR_ATTACHMENT0, pyramid->name, (GLint)level);
+        struct pass_texture from = {UNIT_FREE, level ? pyramid->name : map->textures[0].name,
+            GL_SAMPLE_NEAREST};
+        int32_t source_level[4] = {level ? (int32_t)level - 1 : 0};
+        uint32_t width = side >> level ? side >> level : 1;
+        ok = pass_fill(run->ctx,
+            &(struct pass_fill){.name = "min-max",
+                .fragment = "min_max.frag",
+                .defines = level ? NULL : "#define FROM_DEPTH\n",
+                .stage = PEN_STAGE_SHADOW,
+                .textures = &from,
+                .texture_count = 1,
+                .framebuffer = framebuffer,
+                .width = width,
+                .height = width,
+                .extra = source_level,
+                .extra_bytes = sizeof source_level},
+            error);
+    }
+    gl.DeleteFramebuffers(1, &framebuffer);
+    return ok;
+}
+
+const struct shadow_input *pass_min_max(
+    struct technique_run *run, uint32_t size, struct pen_error *error)
+{
+    struct shadow_key key = {.kind = "min-max", .size = size};
+    return shadow_cache_get(run, &key, build, error);
+}

@@ -1,0 +1,64 @@
+/* The shared blocks that methods are made of. Every one times itself. */
+#pragma once
+#include "renderer/passes/shadow_cache.h"
+
+struct pass_texture {
+    GLuint unit; /* UNIT_FREE and up */
+    GLuint name;
+    enum gl_sampler_kind sampler;
+};
+
+/* A full-screen pass over this face's receivers. `body` defines
+ *     vec4 visibility(Surface s)      (see surface.glsl, light.glsl)
+ * and is compiled with the method's parameters as P(name). Writes run->vis_framebuffer unless
+ * `framebuffer` is given. */
+struct pass_screen {
+    const char *name;    /* of the pass, for the timing record */
+    const char *body;    /* "pcss.glsl" */
+    const char *defines; /* or NULL */
+    const struct gl_texture *shadow; /* depth map on UNIT_SHADOW, or NULL */
+    const struct pass_texture *textures;
+    uint32_t texture_count;
+    GLuint framebuffer; /* 0: run->vis_framebuffer */
+    bool add;           /* blends ONE, ONE instead of replacing */
+    const void *extra;  /* contents of the uniform block GL_UBO_EXTRA, or NULL */
+    uint32_t extra_bytes;
+};
+bool pass_screen(
+    struct technique_run *run, const struct pass_screen *pass, struct pen_error *error);
+
+/* As pass_screen, but over all pixels and without a Surface: the file `fragment` is a whole fragment
+ * shader. Stage and framebuffer are the caller's choice. */
+struct pass_fill {
+    const char *name, *fragment, *defines;
+    enum pen_stage stage;
+    const struct pass_texture *textures;
+    uint32_t texture_count;
+    GLuint framebuffer;
+    uint32_t width, height;
+    bool add;
+    const void *extra;
+    uint32_t extra_bytes;
+    const struct pen_technique_info *info; /* parameters for P(name), or NULL */
+    const void *params;
+};
+bool pass_fill(
+    struct technique_ctx *ctx, const struct pass_fill *pass, struct pen_error *error);
+
+/* Depth map seen from the light's centre, size x size, D32F in textures[0]: 0 at near_z, 1 at far_z
+ * and where nothing is. Kept between requests. */
+const struct shadow_input *pass_depth_map(
+    struct technique_run *run, uint32_t size, struct pen_error *error);
+
+/* Draws the casters seen from `sample` through `rect` into a D32F framebuffer (cleared here). */
+bool pass_draw_casters(struct technique_run *run, GLuint framebuffer, uint32_t size,
+    const float sample[2], const float rect[4], struct pen_error *error);
+
+/* Min and max of linear z (metres from the light's plane; cleared texels: far_z) over 2^k x 2^k
+ * texels: RG32F with the whole mip chain in textures[0]; level 0 has half the map's side. */
+const struct shadow_input *pass_min_max(
+    struct technique_run *run, uint32_t size, struct pen_error *error);
+
+/* The G-buffer of the frame. */
+bool pass_gbuffer(struct technique_ctx *ctx, struct scene *scene, const struct view *view,
+    bool ground, struct gbuffer *gbuffer, uint64_t *triangles, struct pen_error *error);

@@ -1,0 +1,98 @@
+#include "renderer/passes/passes.h"
+
+static void bind_textures(
+    struct technique_ctx *ctx, const struct pass_texture *textures, uint32_t count)
+{
+    for (uint32_t i = 0; i < count; i++) {
+        gl.BindTextureUnit(textures[i].unit, textures[i].name);
+        gl.BindSampler(textures[i].unit, ctx->samplers.names[textures[i].sampler]);
+    }
+}
+
+static void unbind_samplers(const struct pass_texture *textures, uint32_t count)
+{
+    for (uint32_t i = 0; i < count; i++)
+        gl.BindSampler(textures[i].unit, 0);
+}
+
+/* The uniform block of one pass; small and short-lived, so it is made anew. */
+static GLuint bind_extra(const void *extra, uint32_t bytes)
+{
+    GLuint buffer = 0;
+    if (extra) {
+        gl.CreateBuffers(1, &buffer);
+        gl.NamedBufferStorage(buffer, bytes, extra, 0);
+        gl.BindBufferBase(GL_UNIFORM_BUFFER, GL_UBO_EXTRA, buffer);
+    }
+    return buffer;
+}
+
+static void draw(struct technique_ctx *ctx, GLuint program, GLuint framebuffer, uint32_t width,
+    uint32_t height, bool add)
+{
+    gl.BindFramebuffer(GL_FRAMEBUFFER, framebuffer);
+    gl.Viewport(0, 0, (GLsizei)width, (GLsizei)height);
+    gl.ClipControl(GL_UPPER_LEFT, GL_ZERO_TO_ONE);
+    gl.UseProgram(program);
+    gl.BindVertexArray(ctx->empty_array);
+    if (add) {
+        gl.Enable(GL_BLEND);
+        gl.BlendFunc(GL_ONE, GL_ONE);
+    }
+    gl.DrawArrays(GL_TRIANGLES, 0, 3);
+    if (add)
+        gl.Disable(GL_BLEND);
+}
+
+bool pass_screen(struct technique_run *run, const struct pass_screen *pass, struct pen_error *error)
+{
+    struct technique_ctx *ctx = run->ctx;
+    struct gl_program_desc desc = {.vertex = "screen.vert",
+        .fragment = "screen.frag",
+        .body = pass->body,
+        .defines = pass->defines,
+        .info = &run->technique->info,
+        .params = run->params};
+    GLuint program = gl_programs_get(ctx->programs, &desc, error);
+    if (!program)
+        return false;
+    gl_timer_begin(&ctx->timer, PEN_STAGE_TECHNIQUE, pass->name);
+    gl.BindTextureUnit(UNIT_DEPTH, run->gbuffer->depth.name);
+    gl.BindTextureUnit(UNIT_NORMAL, run->gbuffer->normal.name);
+    gl.BindTextureUnit(UNIT_EMISSION, run->emission->name);
+    gl.BindSampler(UNIT_EMISSION, ctx->samplers.names[GL_SAMPLE_TRILINEAR]);
+    if (pass->shadow) {
+        gl.BindTextureUnit(UNIT_SHADOW, pass->shadow->name);
+        gl.BindSampler(UNIT_SHADOW, ctx->samplers.names[GL_SAMPLE_NEAREST_BORDER]);
+    }
+    bind_textures(ctx, pass->textures, pass->texture_count);
+    GLuint extra = bind_extra(pass->extra, pass->extra_bytes);
+    draw(ctx, program, pass->framebuffer ? pass->framebuffer : run->vis_framebuffer, run->width,
+        run->height, pass->add);
+    unbind_samplers(pass->textures, pass->texture_count);
+    gl.BindSampler(UNIT_EMISSION, 0);
+    gl.BindSampler(UNIT_SHADOW, 0);
+    gl.DeleteBuffers(1, &extra);
+    gl_timer_end(&ctx->timer);
+    return true;
+}
+
+bool pass_fill(struct technique_ctx *ctx, const struct pass_fill *pass, struct pen_error *error)
+{
+    struct gl_program_desc desc = {.vertex = "screen.vert",
+        .fragment = pass->fragment,
+        .defines = pass->defines,
+        .info = pass->info,
+        .params = pass->params};
+    GLuint program = gl_programs_get(ctx->programs, &desc, error);
+    if (!program)
+        return false;
+    gl_timer_begin(&ctx->timer, pass->stage, pass->name);
+    bind_textures(ctx, pass->textures, pass->texture_count);
+    GLuint extra = bind_extra(pass->extra, pass->extra_bytes);
+    draw(ctx, program, pass->framebuffer, pass->width, pass->height, pass->add);
+    unbind_samplers(pass->textures, pass->texture_count);
+    gl.DeleteBuffers(1, &extra);
+    gl_timer_end(&ctx->timer);
+    return true;
+}

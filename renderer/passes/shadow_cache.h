@@ -1,0 +1,38 @@
+/* Shadow inputs (depth maps and what is derived from them) depend on scene and light, not on the
+ * camera: they are kept between requests under the renderer's memory budget. */
+#pragma once
+#include "renderer/technique.h"
+
+#define SHADOW_INPUT_TEXTURES 6
+
+/* What an input is. A kind of a new method is a string literal of its own: two inputs are the same
+ * when kind, scene, light face, size and extra agree. */
+struct shadow_key {
+    const char *kind;   /* "depth", "minmax", ... */
+    uint32_t size;      /* map texels per side */
+    uint32_t extra[8];  /* whatever else the content depends on; bit patterns of floats too */
+};
+
+struct shadow_input {
+    struct gl_texture textures[SHADOW_INPUT_TEXTURES]; /* as the kind defines */
+    float values[64]; /* numbers that belong to it (windows of off-axis maps, ...) */
+};
+
+struct shadow_cache *shadow_cache_create(void);
+void shadow_cache_destroy(struct shadow_cache *cache);
+
+typedef bool (*shadow_build)(struct technique_run *run, const struct shadow_key *key,
+    struct shadow_input *input, struct pen_error *error);
+
+/* The input, built by `build` when it is not there. Valid until the end of the frame. */
+const struct shadow_input *shadow_cache_get(struct technique_run *run,
+    const struct shadow_key *key, shadow_build build, struct pen_error *error);
+
+uint64_t shadow_cache_bytes(const struct shadow_cache *cache);
+/* Drops the least recently used inputs of earlier frames until `bytes` or less are held. */
+void shadow_cache_trim(struct shadow_cache *cache, uint64_t bytes);
+void shadow_cache_drop_scene(struct shadow_cache *cache, const struct scene *scene);
+/* Starts a frame: what is used from now on is not trimmed. Sets the counters to 0. */
+void shadow_cache_begin_frame(struct shadow_cache *cache);
+/* 1 when every input of this frame was already there. */
+bool shadow_cache_all_reused(const struct shadow_cache *cache);

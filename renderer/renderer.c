@@ -1,0 +1,304 @@
+#include "renderer/renderer.h"
+#include "renderer/frame.h"
+#include "renderer/generate/generate.h"
+#include "renderer/gl/context.h"
+#include "renderer/passes/shadow_cache.h"
+#include <stdlib.h>
+#include <string.h>
+
+#define TECHNIQUE(name) extern const struct technique technique_##name;
+#include "renderer/techniques/registry.def"
+#undef TECHNIQUE
+const struct technique *const technique_registry[] = {
+#define TECHNIQUE(name) &technique_##name,
+#include "renderer/techniques/registry.def"
+#undef TECHNIQUE
+    NULL};
+
+#define TECHNIQUE(name) +1
+enum { TECHNIQUE_COUNT = 0
+#include "renderer/techniques/registry.def"
+};
+#undef TECHNIQUE
+
+#define MAX_RESIDENT 256
+
+const char *const pen_device_choice_names[] = {"auto", "gpu", "surfaceless", "osmesa", NULL};
+
+struct pen_renderer {
+    struct gl_context *context;
+    struct technique_ctx ctx;
+    struct frame_targets targets;
+    uint64_t budget, clock;
+    bool lost;
+    struct scene *scenes[MAX_RESIDENT]; /* emission images too: scenes without geometry */
+    uint32_t scene_count;
+    void *states[TECHNIQUE_COUNT];
+};
+
+const struct pen_catalogue *pen_renderer_catalogue(void)
+{
+    static const struct pen_technique_info *const infos[] = {
+#define TECHNIQUE(name) &technique_##name.info,
+#include "renderer/techniques/registry.def"
+#undef TECHNIQUE
+    };
+    static const struct pen_catalogue catalogue = {infos, TECHNIQUE_COUNT};
+    return &catalogue;
+}
+
+struct pen_renderer *pen_renderer_create(
+    const struct pen_renderer_config *config, struct pen_error *error)
+{
+    struct pen_renderer *r = calloc(1, sizeof *r);
+    if (!r)
+        abort();
+    r->context = gl_context_create(config, &r->ctx.device, error);
+    if (!r->context) {
+        free(r);
+        return NULL;
+    }
+    r->budget = config->gpu_memory_bytes ? config->gpu_memory_bytes : 1ull << 30;
+    r->ctx.programs = gl_programs_create();
+    r->ctx.shadows = shadow_cache_create();
+    gl_samplers_init(&r->ctx.samplers);
+    gl_timer_init(&r->ctx.timer, r->ctx.device.software);
+    gl.CreateVertexArrays(1, &r->ctx.empty_array);
+    gl.CreateBuffers(1, &r->ctx.light_block);
+    gl.CreateBuffers(1, &r->ctx.param_block);
+    r->ctx.white = gl_texture_create(GL_RGBA8, 1, 1, 0, 1);
+    static const uint8_t white[4] = {255, 255, 255, 255};
+    gl.TextureSubImage2D(r->ctx.white.name, 0, 0, 0, 1, 1, GL_RGBA, GL_UNSIGNED_BYTE, white);
+    for (uint32_t i = 0; i < TECHNIQUE_COUNT; i++) {
+        const struct technique *t = technique_registry[i];
+        r->states[i] = calloc(1, t->state_size + 1);
+        if (!r->states[i])
+            abort();
+        if (t->create && !t->create(&r->ctx, r->states[i], error)) {
+            pen_renderer_destroy(r);
+            return NULL;
+        }
+    }
+    return r;
+}
+
+void pen_renderer_destroy(struct pen_renderer *r)
+{
+    if (!r)
+        return;
+    for (uint32_t i = 0; i < TECHNIQUE_COUNT; i++) {
+        if (r->states[i] && technique_registry[i]->destroy)
+            technique_registry[i]->destroy(&r->ctx, r->states[i]);
+        free(r->states[i]);
+    }
+    for (uint32_t i = 0; i < r->scene_count; i++)
+        scene_destroy(r->scenes[i]);
+    frame_targets_finish(&r->targets);
+    shadow_cache_destroy(r->ctx.shadows);
+    gl_timer_finish(&r->ctx.timer);
+    gl_samplers_finish(&r->ctx.samplers);
+    gl_programs_destroy(r->ctx.programs);
+    gl_texture_destroy(&r->ctx.white);
+    GLuint buffers[] = {r->ctx.light_block, r->ctx.param_block};
+    gl.DeleteBuffers(2, buffers);
+    gl.DeleteVertexArrays(1, &r->ctx.empty_array);
+    gl_context_destroy(r->context);
+    free(r);
+}
+
+const struct pen_device_info *pen_renderer_device(const struct pen_renderer *r)
+{
+    return &r->ctx.device;
+}
+
+static struct scene *find_scene(const struct pen_renderer *r, const uint8_t id[PEN_ID_BYTES])
+{
+    for (uint32_t i = 0; i < r->scene_count; i++)
+        if (!memcmp(r->scenes[i]->id, id, PEN_ID_BYTES))
+            return r->scenes[i];
+    return NULL;
+}
+
+static uint64_t scene_bytes(const struct pen_renderer *r)
+{
+    uint64_t bytes = 0;
+    for (uint32_t i = 0; i < r->scene_count; i++)
+        bytes += r->scenes[i]->bytes;
+    return bytes;
+}
+
+uint64_t pen_renderer_gpu_bytes(const struct pen_renderer *r)
+{
+    return scene_bytes(r) + shadow_cache_bytes(r->ctx.shadows);
+}
+
+static void remove_scene(struct pen_renderer *r, uint32_t i)
+{
+    shadow_cache_drop_scene(r->ctx.shadows, r->scenes[i]);
+    scene_destroy(r->scenes[i]);
+    r->scenes[i] = r->scenes[--r->scene_count];
+}
+
+/* Frees least recently used scenes, never `keep`, until the budget holds. */
+static void evict(struct pen_renderer *r, const struct scene *keep)
+{
+    for (;;) {
+        uint64_t scenes = scene_bytes(r), least = UINT64_MAX;
+        /* Shadow inputs are cheaper to make again than scenes are to upload. */
+        shadow_cache_trim(r->ctx.shadows, r->budget > scenes ? r->budget - scenes : 0);
+        if (scenes <= r->budget && r->scene_count < MAX_RESIDENT)
+            return;
+        uint32_t oldest = UINT32_MAX;
+        for (uint32_t i = 0; i < r->scene_count; i++)
+            if (r->scenes[i] != keep && r->scenes[i]->last_use < least)
+                least = r->scenes[i]->last_use, oldest = i;
+        if (oldest == UINT32_MAX)
+            return;
+        remove_scene(r, oldest);
+    }
+}
+
+static bool load(struct pen_renderer *r, const uint8_t id[PEN_ID_BYTES], struct scene *scene,
+    struct pen_error *error)
+{
+    if (!scene)
+        return false;
+    (void)id;
+    if (scene->bytes > r->budget) {
+        pen_fail(error, PEN_TOO_LARGE, "",
+            "The scene needs %.0f MiB of GPU memory; %.0f MiB are allowed.",
+            (double)scene->bytes / (1 << 20), (double)r->budget / (1 << 20));
+        scene_destroy(scene);
+        return false;
+    }
+    scene->last_use = ++r->clock;
+    r->scenes[r->scene_count++] = scene;
+    shadow_cache_begin_frame(r->ctx.shadows);
+    evict(r, scene);
+    return true;
+}
+
+bool pen_renderer_load_scene(
+    struct pen_renderer *r, const uint8_t id[PEN_ID_BYTES], int fd, struct pen_error *error)
+{
+    return find_scene(r, id) || load(r, id, scene_create(id, fd, error), error);
+}
+
+bool pen_renderer_has_scene(const struct pen_renderer *r, const uint8_t id[PEN_ID_BYTES])
+{
+    return find_scene(r, id) != NULL;
+}
+
+void pen_renderer_drop_scene(struct pen_renderer *r, const uint8_t id[PEN_ID_BYTES])
+{
+    for (uint32_t i = 0; i < r->scene_count; i++)
+        if (!memcmp(r->scenes[i]->id, id, PEN_ID_BYTES)) {
+            remove_scene(r, i);
+            return;
+        }
+}
+
+bool pen_renderer_load_image(
+    struct pen_renderer *r, const uint8_t id[PEN_ID_BYTES], int fd, struct pen_error *error)
+{
+    return pen_renderer_load_scene(r, id, fd, error);
+}
+
+bool pen_renderer_has_image(const struct pen_renderer *r, const uint8_t id[PEN_ID_BYTES])
+{
+    return pen_renderer_has_scene(r, id);
+}
+
+static const struct gl_texture *find_image(void *owner, const struct pen_light *light)
+{
+    struct pen_renderer *r = owner;
+    if (light->texture != PEN_TEXTURE_IMAGE)
+        return NULL;
+    struct scene *scene = find_scene(r, light->image);
+    return scene && scene->blob.image_count ? &scene->images[0] : NULL;
+}
+
+bool pen_renderer_render(struct pen_renderer *r, const struct pen_request *request,
+    struct pen_frame *frame, struct pen_result *result, struct pen_error *error)
+{
+    memset(result, 0, sizeof *result);
+    memset(frame, 0, sizeof *frame);
+    result->completed = *request;
+    result->device = r->ctx.device;
+    struct scene *scene = find_scene(r, request->scene);
+    if (!pen_request_check(request, pen_renderer_catalogue(), error))
+        goto fail;
+    if (!scene) {
+        pen_fail(error, PEN_INTERNAL, "", "The scene is not resident.");
+        goto fail;
+    }
+    uint32_t t = 0;
+    while (strcmp(technique_registry[t]->info.name, request->technique))
+        t++;
+    scene->last_use = ++r->clock;
+    struct frame_job job = {.ctx = &r->ctx,
+        .targets = &r->targets,
+        .scene = scene,
+        .request = &result->completed,
+        .technique = technique_registry[t],
+        .technique_state = r->states[t],
+        .find_image = find_image,
+        .owner = r};
+    bool ok = frame_render(&job, frame, result, error);
+    evict(r, scene);
+    result->gpu_bytes = pen_renderer_gpu_bytes(r);
+    GLenum gl_error = gl.GetError();
+    if (ok && gl_error == GL_NO_ERROR)
+        return true;
+    if (gl_error == GL_CONTEXT_LOST || gl_error == GL_OUT_OF_MEMORY)
+        r->lost = true;
+    if (ok)
+        pen_fail(error, PEN_INTERNAL, "", "OpenGL reported error 0x%04x.", gl_error);
+    pen_frame_finish(frame);
+fail:
+    if (error)
+        result->error = *error;
+    return false;
+}
+
+bool pen_renderer_is_lost(struct pen_renderer *r)
+{
+    return r->lost || gl.GetGraphicsResetStatus() != GL_NO_ERROR;
+}
+
+static void warm_scene(struct pen_renderer *r, uint32_t kind)
+{
+    struct pen_generated_options options = {.kind = kind};
+    void *data = NULL;
+    size_t bytes = 0;
+    uint8_t id[PEN_ID_BYTES] = {'w', 'a', 'r', 'm', (uint8_t)kind};
+    if (!pen_generate_blob(&options, &data, &bytes, NULL))
+        return;
+    if (load(r, id, scene_create_memory(id, data, bytes, NULL), NULL)) {
+        const struct pen_catalogue *catalogue = pen_renderer_catalogue();
+        for (uint32_t i = 0; i < catalogue->count; i++) {
+            struct pen_request request;
+            struct pen_result result;
+            struct pen_frame frame;
+            pen_request_default(&request, catalogue);
+            memcpy(request.scene, id, sizeof id);
+            memset(request.technique, 0, sizeof request.technique);
+            strcpy(request.technique, catalogue->items[i]->name);
+            memset(request.technique_params, 0, sizeof request.technique_params);
+            pen_params_default(catalogue->items[i]->params, request.technique_params);
+            request.width = 64, request.height = 48;
+            if (pen_renderer_render(r, &request, &frame, &result, NULL))
+                pen_frame_finish(&frame);
+        }
+        pen_renderer_drop_scene(r, id);
+    }
+    free(data);
+}
+
+double pen_renderer_warm_up(struct pen_renderer *r)
+{
+    double begin = gl_now_ms();
+    warm_scene(r, PEN_GENERATED_DEMO);
+    warm_scene(r, PEN_GENERATED_PLANAR_MASK);
+    return gl_now_ms() - begin;
+}

@@ -1,0 +1,57 @@
+/* A scene in GPU memory, and the drawing of it. */
+#pragma once
+#include "renderer/blob/pscene.h"
+#include "renderer/cull.h"
+#include "renderer/gl/program.h"
+#include "renderer/gl/texture.h"
+
+/* Draws that share state. What differs per draw (matrix, material) rides on instance attributes. */
+struct scene_group {
+    uint32_t first, count; /* of scene->order */
+    uint32_t material;     /* whose textures are bound; UINT32_MAX: none needed */
+    bool double_sided, mirrored;
+    bool alpha; /* MASK or BLEND: fragments may be discarded */
+};
+
+struct scene {
+    uint8_t id[PEN_ID_BYTES];
+    struct psc_scene blob; /* stays mapped: culling and tracing read it */
+    GLuint positions, attributes, indices, instances, materials, commands;
+    GLuint depth_array, full_array; /* vertex arrays: positions only; everything */
+    struct gl_texture *images;
+    GLuint *samplers; /* one per blob texture */
+    uint32_t *order;  /* instances sorted by state */
+    struct scene_group *groups;
+    uint32_t group_count;
+    struct cull_command *command_room;
+    bool has_emission, has_unlit;
+    uint64_t bytes;
+    uint64_t last_use;
+    void *trace; /* owned by the tracer when there is one; freed through trace_free */
+    void (*trace_free)(void *);
+};
+
+/* Uploads the blob behind `fd`. Errors as psc_open; PEN_INTERNAL out of GPU memory. */
+struct scene *scene_create(const uint8_t id[PEN_ID_BYTES], int fd, struct pen_error *error);
+/* From memory that outlives the scene. */
+struct scene *scene_create_memory(const uint8_t id[PEN_ID_BYTES], const void *data, size_t bytes,
+    struct pen_error *error);
+void scene_destroy(struct scene *scene);
+
+bool scene_is_empty(const struct scene *scene);
+float scene_radius(const struct scene *scene); /* of the sphere around the bounds, m; >= 1e-4 */
+void scene_center(const struct scene *scene, float center[3]);
+
+/* The two programs of a geometry pass: `opaque` without texture access, `textured` for groups that
+ * need it (alpha tests, and all textured materials when `full`). */
+struct scene_pass {
+    GLuint opaque, textured;
+    bool full; /* draws with all attributes and textures; else positions only where it can */
+    bool front_is_clockwise; /* the target's y axis is flipped */
+};
+/* Returns the triangles drawn. The caller has bound framebuffer, viewport and depth state. */
+uint64_t scene_draw(
+    struct scene *scene, const struct cull_view *view, const struct scene_pass *pass);
+
+/* Texture units of the geometry passes. */
+enum { SCENE_UNIT_BASE, SCENE_UNIT_SURFACE, SCENE_UNIT_NORMAL, SCENE_UNIT_OCCLUSION, SCENE_UNIT_EMISSION };

@@ -1,0 +1,18 @@
+// From scene radiance to display values (sRGB, IEC 61966-2-1).
+vec3 srgb_encode(vec3 c)
+{
+    c = clamp(c, 0.0, 1.0);
+    return mix(12.92 * c, 1.055 * pow(c, vec3(1.0 / 2.4)) - 0.055, greaterThan(c, vec3(0.0031308)));
+}
+
+// Tone curves: 0 clip, 1 Reinhard 2002 on luminance, 2 the ACES filmic fit of Narkowicz 2015.
+vec3 display_encode(vec3 radiance)
+{
+    vec3 c = max(radiance * view.display.x, 0.0);
+    int curve = int(view.display.y);
+    if (curve == 1)
+        c /= 1.0 + dot(c, vec3(0.2126, 0.7152, 0.0722));
+    else if (curve == 2)
+        c = c * (2.51 * c + 0.03) / (c * (2.43 * c + 0.59) + 0.14);
+    return srgb_encode(c);
+}

@@ -1,0 +1,117 @@
+// What shading needs of the nearest surface. TEXTURED: material textures are bound and alpha is
+// tested; EMIT: a fourth target takes emission.
+#include "view.glsl"
+#include "octahedral.glsl"
+#include "hash.glsl"
+#include "material.glsl"
+
+in vec3 v_position;
+in vec3 v_normal;
+in vec4 v_tangent;
+in vec4 v_uv;
+in vec4 v_color;
+flat in uint v_material;
+
+layout(location = 0) out vec4 out_normal;  // geometric, shading
+layout(location = 1) out vec4 out_albedo;  // square root of albedo; a: 1 a lit surface, 0 the ground
+layout(location = 2) out vec4 out_surface; // roughness, metallic, occlusion, F0 / 0.08
+#ifdef EMIT
+layout(location = 3) out vec3 out_emission;
+#endif
+
+// Specular-glossiness to metallic-roughness: the metallic value whose mixture of base colour and
+// dielectric reproduces both colours' brightness (solved as in the extension's appendix).
+float solve_metallic(float diffuse, float specular)
+{
+    const float dielectric = 0.04;
+    if (specular < dielectric)
+        return 0.0;
+    float one_minus = 1.0 - specular;
+    float b = diffuse * one_minus / (1.0 - dielectric) + specular - 2.0 * dielectric;
+    float c = dielectric - specular;
+    return clamp((-b + sqrt(max(b * b - 4.0 * dielectric * c, 0.0))) / (2.0 * dielectric), 0.0, 1.0);
+}
+
+float brightness(vec3 c)
+{
+    return sqrt(dot(c * c, vec3(0.299, 0.587, 0.114)));
+}
+
+void main()
+{
+    vec3 geometric = normalize(cross(dFdx(v_position), dFdy(v_position)));
+    if (dot(geometric, v_position) > 0.0)
+        geometric = -geometric;
+    if (!(dot(geometric, geometric) > 0.5)) // a sliver without derivatives
+        geometric = normalize(-v_position);
+    vec3 shading = normalize(v_normal);
+    if (!(dot(shading, shading) > 0.5))
+        shading = geometric;
+    if (dot(shading, geometric) < 0.0)
+        shading = -shading;
+#ifdef GROUND
+    out_normal = vec4(octahedral_encode(vec3(0.0, geometric.y > 0.0 ? 1.0 : -1.0, 0.0)),
+        octahedral_encode(shading));
+    out_albedo = vec4(sqrt(view.ground_albedo.rgb), 0.0);
+    out_surface = vec4(1.0, 0.0, 1.0, 0.0);
+#ifdef EMIT
+    out_emission = vec3(0.0);
+#endif
+#else
+    Material m = materials[v_material];
+    vec3 emission = m.emissive.rgb;
+    float metallic = m.surface.x, roughness = m.surface.y, occlusion = 1.0, specular = 0.5;
+    vec3 f0 = m.specular.rgb;
+    float glossiness = m.specular.a;
+#ifdef TEXTURED
+    vec4 base = material_base(v_material, v_uv, v_color);
+    float threshold = unit_float(hash3(uvec3(gl_FragCoord.xy, uint(view.display.z))).x);
+    if (alpha_is_cut(v_material, base.a, threshold))
+        discard;
+    if (material_has(v_material, SURFACE)) {
+        vec4 t = texture(surface_map, material_uv(v_material, SURFACE, v_uv));
+        metallic *= t.b;
+        roughness *= t.g;
+        f0 *= t.rgb;
+        glossiness *= t.a;
+    }
+    if (material_has(v_material, OCCLUSION))
+        occlusion = 1.0 + m.surface.z *
+            (texture(occlusion_map, material_uv(v_material, OCCLUSION, v_uv)).r - 1.0);
+    if (material_has(v_material, EMISSION))
+        emission *= texture(emission_map, material_uv(v_material, EMISSION, v_uv)).rgb;
+    if (material_has(v_material, NORMAL) && dot(v_tangent.xyz, v_tangent.xyz) > 0.0) {
+        vec3 t = texture(normal_map, material_uv(v_material, NORMAL, v_uv)).xyz * 2.0 - 1.0;
+        t.xy *= m.surface.w;
+        vec3 tangent = normalize(v_tangent.xyz - shading * dot(v_tangent.xyz, shading));
+        vec3 bitangent = cross(shading, tangent) * v_tangent.w;
+        vec3 bent = normalize(tangent * t.x + bitangent * t.y + shading * t.z);
+        if (dot(bent, bent) > 0.5)
+            shading = bent;
+    }
+#else
+    vec4 base = m.base_color * v_color;
+#endif
+    vec3 albedo = base.rgb;
+    if ((m.flags.y & SPECULAR_GLOSSINESS) != 0u) {
+        float strongest = max(f0.r, max(f0.g, f0.b));
+        metallic = solve_metallic(brightness(albedo) , brightness(f0));
+        vec3 from_diffuse = albedo * (1.0 - strongest) / (0.96 * max(1.0 - metallic, 1e-4));
+        vec3 from_specular = (f0 - 0.04 * (1.0 - metallic)) / max(metallic, 1e-4);
+        albedo = clamp(mix(from_diffuse, from_specular, metallic * metallic), 0.0, 1.0);
+        roughness = 1.0 - glossiness;
+        specular = clamp(strongest / 0.08, 0.0, 1.0);
+    }
+    if ((m.flags.y & UNLIT) != 0u) {
+        emission = albedo;
+        albedo = vec3(0.0);
+        specular = 0.0;
+    }
+    out_normal = vec4(octahedral_encode(geometric), octahedral_encode(shading));
+    out_albedo = vec4(sqrt(clamp(albedo, 0.0, 1.0)), 1.0);
+    out_surface = vec4(roughness, metallic, occlusion, specular);
+#ifdef EMIT
+    out_emission = emission;
+#endif
+#endif
+}

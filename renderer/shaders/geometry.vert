@@ -1,0 +1,60 @@
+// All geometry passes. FULL: every attribute; ALPHA: what an alpha test needs; GROUND: the receiver
+// under the bounds, made of four vertices without any buffer.
+#include "view.glsl"
+
+uniform mat4 to_clip; // world to clip space of the target
+
+layout(location = 0) in vec3 position;
+#if defined(FULL) || defined(ALPHA)
+layout(location = 3) in vec4 uv;
+layout(location = 4) in vec4 color;
+layout(location = 11) in float material;
+out vec4 v_uv;
+out vec4 v_color;
+flat out uint v_material;
+#endif
+#ifdef FULL
+layout(location = 1) in vec4 normal;
+layout(location = 2) in vec4 tangent;
+out vec3 v_position; // relative to the eye: keeps derivatives exact far from the origin
+out vec3 v_normal;
+out vec4 v_tangent;
+#endif
+layout(location = 8) in vec4 row0;
+layout(location = 9) in vec4 row1;
+layout(location = 10) in vec4 row2;
+
+void main()
+{
+#ifdef GROUND
+    vec2 corner = vec2((gl_VertexID & 1) * 2 - 1, (gl_VertexID >> 1) * 2 - 1);
+    vec3 world = vec3(view.ground.x + corner.x * view.ground.w, view.ground.y,
+        view.ground.z - corner.y * view.ground.w);
+    v_uv = vec4(0.0);
+    v_color = vec4(1.0);
+    v_material = 0xffffffffu;
+    v_normal = vec3(0.0, 1.0, 0.0);
+    v_tangent = vec4(0.0);
+#else
+    vec4 p = vec4(position, 1.0);
+    vec3 world = vec3(dot(row0, p), dot(row1, p), dot(row2, p));
+#if defined(FULL) || defined(ALPHA)
+    v_uv = uv;
+    v_color = color;
+    v_material = uint(material);
+#endif
+#ifdef FULL
+    // Normals go with the cofactor matrix, which also serves singular and mirroring matrices.
+    v_normal = cross(row1.xyz, row2.xyz) * normal.x + cross(row2.xyz, row0.xyz) * normal.y +
+        cross(row0.xyz, row1.xyz) * normal.z;
+    if (dot(row0.xyz, cross(row1.xyz, row2.xyz)) < 0.0)
+        v_normal = -v_normal;
+    v_tangent = vec4(dot(row0.xyz, tangent.xyz), dot(row1.xyz, tangent.xyz),
+        dot(row2.xyz, tangent.xyz), tangent.w);
+#endif
+#endif
+#ifdef FULL
+    v_position = world - view.eye.xyz;
+#endif
+    gl_Position = to_clip * vec4(world, 1.0);
+}

@@ -1,0 +1,18 @@
+// Integer hash with good avalanche (Jarzynski and Olano 2020, pcg3d).
+uvec3 hash3(uvec3 v)
+{
+    v = v * 1664525u + 1013904223u;
+    v.x += v.y * v.z;
+    v.y += v.z * v.x;
+    v.z += v.x * v.y;
+    v ^= v >> 16u;
+    v.x += v.y * v.z;
+    v.y += v.z * v.x;
+    v.z += v.x * v.y;
+    return v;
+}
+
+float unit_float(uint bits)
+{
+    return float(bits >> 8) * (1.0 / 16777216.0);
+}

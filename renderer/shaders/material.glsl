@@ -1,0 +1,53 @@
+// Materials and their textures; mirrors struct material_record in scene.c.
+struct Material {
+    vec4 base_color;
+    vec4 emissive;  // w: alpha cutoff
+    vec4 surface;   // metallic, roughness, occlusion strength, normal scale
+    vec4 specular;  // specular-glossiness: F0 factor, glossiness
+    uvec4 flags;    // alpha mode, flags, mask of textures, uv sets
+    vec4 transforms[10];
+};
+layout(std430, binding = 0) readonly buffer Materials {
+    Material materials[];
+};
+
+const uint ALPHA_MASK = 1u, ALPHA_BLEND = 2u;
+const uint DOUBLE_SIDED = 1u, UNLIT = 2u, SPECULAR_GLOSSINESS = 4u;
+const int BASE = 0, SURFACE = 1, NORMAL = 2, OCCLUSION = 3, EMISSION = 4;
+
+layout(binding = 0) uniform sampler2D base_map;
+layout(binding = 1) uniform sampler2D surface_map;
+layout(binding = 2) uniform sampler2D normal_map;
+layout(binding = 3) uniform sampler2D occlusion_map;
+layout(binding = 4) uniform sampler2D emission_map;
+
+bool material_has(uint material, int slot)
+{
+    return (materials[material].flags.z >> slot & 1u) != 0u;
+}
+
+vec2 material_uv(uint material, int slot, vec4 uv)
+{
+    vec2 t = (materials[material].flags.w >> slot & 1u) != 0u ? uv.zw : uv.xy;
+    vec4 row0 = materials[material].transforms[2 * slot];
+    vec4 row1 = materials[material].transforms[2 * slot + 1];
+    return vec2(dot(row0.xy, t) + row0.z, dot(row1.xy, t) + row1.z);
+}
+
+// Base colour with vertex colour; the caller tests the alpha.
+vec4 material_base(uint material, vec4 uv, vec4 color)
+{
+    vec4 base = materials[material].base_color * color;
+    if (material_has(material, BASE))
+        base *= texture(base_map, material_uv(material, BASE, uv));
+    return base;
+}
+
+// Blended surfaces are cut by a hashed threshold: accumulation over frames resolves it.
+bool alpha_is_cut(uint material, float alpha, float threshold)
+{
+    uint mode = materials[material].flags.x;
+    if (mode == ALPHA_MASK)
+        return alpha < materials[material].emissive.w;
+    return mode == ALPHA_BLEND && alpha <= threshold;
+}

@@ -1,0 +1,24 @@
+// A method's visibility() for every receiver of this face. The target starts at 1.
+#include "surface.glsl"
+#include "BODY"
+
+layout(location = 0) out vec4 vis;
+
+void main()
+{
+    ivec2 pixel = ivec2(gl_FragCoord.xy);
+    float depth = texelFetch(g_depth, pixel, 0).r;
+    if (depth == 0.0)
+        discard;
+    Surface s = surface_at(pixel, depth);
+    if (light.cube != 0 && max(abs(s.p.x), abs(s.p.y)) > s.p.z)
+        discard;
+    if (light.omni != 0 && s.p.z <= light.near_z)
+        discard;
+    if (s.p.z <= 0.0 && light.parallel == 0)
+        vis = vec4(0.0);
+    else if (!light_is_above_horizon(s.p, s.n))
+        vis = vec4(0.0);
+    else
+        vis = visibility(s);
+}

@@ -1,0 +1,141 @@
+// Direct light of all lights times their visibility, plus ambient and emission. RESOLVE: there is
+// one frame only, so the display curve is applied here.
+#include "view.glsl"
+#include "octahedral.glsl"
+#include "irradiance.glsl"
+#include "display.glsl"
+
+layout(binding = 0) uniform sampler2D g_depth;
+layout(binding = 1) uniform sampler2D g_normal;
+layout(binding = 2) uniform sampler2D g_albedo;
+layout(binding = 3) uniform sampler2D g_surface;
+#ifdef EMIT
+layout(binding = 4) uniform sampler2D g_emission;
+#endif
+layout(binding = 7) uniform sampler2DArray visibility_maps;
+
+const int RECT = 0, DISK = 1, SPHERE = 2, SUN = 3, POINT = 4, SPOT = 5;
+struct ShadeLight {
+    vec4 origin;   // w: type
+    vec4 half_x;   // w: radius
+    vec4 half_y;   // w: cosine of the inner cone
+    vec4 z;        // w: cosine of the outer cone
+    vec4 radiance; // w: area, m^2
+};
+layout(std140, binding = 3) uniform ShadeBlock {
+    ivec4 count;
+    ShadeLight lights[8];
+} shade;
+
+layout(location = 0) out vec4 color;
+
+struct Material {
+    vec3 diffuse, f0;
+    float alpha; // squared roughness
+};
+
+// GGX with height-correlated Smith visibility and Schlick's Fresnel term, as glTF 2.0 appendix B.
+// `spread` widens the lobe by the solid angle that one light sample stands for.
+vec3 specular_brdf(Material m, vec3 n, vec3 v, vec3 l, float spread)
+{
+    vec3 h = normalize(v + l);
+    float nl = max(dot(n, l), 0.0), nv = max(dot(n, v), 1e-3), nh = max(dot(n, h), 0.0);
+    float a = m.alpha + spread, a2 = a * a;
+    float t = nh * nh * (a2 - 1.0) + 1.0;
+    float d = a2 / (3.14159265 * t * t);
+    float smith = 0.5 / (nl * sqrt(nv * nv * (1.0 - a2) + a2) + nv * sqrt(nl * nl * (1.0 - a2) + a2));
+    float f = pow(1.0 - max(dot(v, h), 0.0), 5.0);
+    return (m.f0 + (1.0 - m.f0) * f) * d * smith;
+}
+
+// Quadrature of the specular part over the emitter: k x k cells, fewer for rough surfaces.
+vec3 specular_area(Material m, ShadeLight s, vec3 p, vec3 n, vec3 v)
+{
+    int type = int(s.origin.w), k = m.alpha > 0.25 ? 2 : 4;
+    vec3 half_x = s.half_x.xyz, half_y = s.half_y.xyz, axis = s.z.xyz;
+    if (type == SPHERE) { // the disk that faces the receiver
+        axis = normalize(p - s.origin.xyz);
+        vec3 up = abs(axis.y) < 0.9 ? vec3(0.0, 1.0, 0.0) : vec3(1.0, 0.0, 0.0);
+        half_x = normalize(cross(up, axis)) * s.half_x.w;
+        half_y = cross(axis, half_x);
+    }
+    float cell = (type == RECT ? 4.0 : 3.14159265) * length(half_x) * length(half_y) / float(k * k);
+    vec3 sum = vec3(0.0);
+    for (int i = 0; i < k * k; i++) {
+        vec2 u = (vec2(i % k, i / k) + 0.5) * (2.0 / float(k)) - 1.0;
+        if (type != RECT) { // concentric map of Shirley and Chiu
+            bool wide = abs(u.x) > abs(u.y);
+            float r = wide ? u.x : u.y;
+            float t = 0.78539816 * (wide ? u.y / u.x : (r == 0.0 ? 0.0 : 2.0 - u.x / u.y));
+            u = r * vec2(cos(t), sin(t));
+        }
+        vec3 to = s.origin.xyz + u.x * half_x + u.y * half_y - p;
+        float d2 = dot(to, to);
+        vec3 l = to * inversesqrt(d2);
+        float g = max(dot(n, l), 0.0) * max(-dot(axis, l), 0.0) / d2 * cell;
+        if (g > 0.0)
+            sum += specular_brdf(m, n, v, l, min(0.25 * sqrt(cell / d2), 0.5)) * g;
+    }
+    return sum;
+}
+
+vec3 reflected(Material m, ShadeLight s, vec3 p, vec3 n, vec3 v)
+{
+    int type = int(s.origin.w);
+    vec3 to = s.origin.xyz - p;
+    if (type >= SUN) {
+        vec3 l = type == SUN ? -s.z.xyz : normalize(to);
+        float nl = dot(n, l);
+        if (nl <= 0.0)
+            return vec3(0.0);
+        float e = type == SUN ? nl : nl / dot(to, to);
+        if (type == SPOT)
+            e *= pow(clamp((dot(-l, s.z.xyz) - s.z.w) / max(s.half_y.w - s.z.w, 1e-4), 0.0, 1.0), 2.0);
+        return (m.diffuse * (1.0 / 3.14159265) + specular_brdf(m, n, v, l, 0.0)) * e;
+    }
+    if (type != SPHERE && dot(to, s.z.xyz) >= 0.0)
+        return vec3(0.0);
+    float e = type == RECT ? irradiance_rect(p, n, s.origin.xyz, s.half_x.xyz, s.half_y.xyz)
+        : type == DISK     ? irradiance_disk(p, n, s.origin.xyz, s.half_x.xyz, s.half_y.xyz)
+                           : irradiance_sphere(p, n, s.origin.xyz, s.half_x.w);
+    if (e <= 0.0)
+        return vec3(0.0);
+    return m.diffuse * (e / 3.14159265) + specular_area(m, s, p, n, v);
+}
+
+void main()
+{
+    ivec2 pixel = ivec2(gl_FragCoord.xy);
+    float depth = texelFetch(g_depth, pixel, 0).r;
+    vec3 sum = view.background.rgb;
+    if (depth != 0.0) {
+        vec3 p = unproject(view.clip_to_world, pixel_to_ndc(pixel), depth);
+        vec3 v = normalize(view.eye.xyz - p);
+        vec3 n = octahedral_decode(texelFetch(g_normal, pixel, 0).zw);
+        vec4 albedo = texelFetch(g_albedo, pixel, 0);
+        vec4 surface = texelFetch(g_surface, pixel, 0);
+        albedo.rgb *= albedo.rgb;
+        Material m;
+        m.diffuse = albedo.rgb * (1.0 - surface.g) * (1.0 - 0.08 * surface.a);
+        m.f0 = mix(vec3(0.08 * surface.a), albedo.rgb, surface.g);
+        m.alpha = max(surface.r * surface.r, 0.002);
+        sum = view.ambient.rgb * (m.diffuse + m.f0) * surface.b;
+#ifdef EMIT
+        sum += texelFetch(g_emission, pixel, 0).rgb;
+#endif
+        for (int i = 0; i < shade.count.x; i++) {
+            vec3 t = texelFetch(visibility_maps, ivec3(pixel, i), 0).rgb;
+            if (t != vec3(0.0))
+                sum += t * shade.lights[i].radiance.rgb * reflected(m, shade.lights[i], p, n, v);
+        }
+        if (albedo.a == 0.0) { // the ground fades into the background, so that it has no edge
+            float d = distance(p.xz, view.ground.xz) / view.ground.w;
+            sum = mix(sum, view.background.rgb, smoothstep(0.35, 0.95, d));
+        }
+    }
+#ifdef RESOLVE
+    color = vec4(display_encode(sum), 1.0);
+#else
+    color = vec4(sum * view.display.w, view.display.w);
+#endif
+}

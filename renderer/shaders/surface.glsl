@@ -1,0 +1,31 @@
+// The receiver under a pixel, in light space (techniques' common frame).
+#include "view.glsl"
+#include "octahedral.glsl"
+#include "light.glsl"
+
+layout(binding = 0) uniform sampler2D g_depth;
+layout(binding = 1) uniform sampler2D g_normal;
+
+struct Surface {
+    vec3 p;       // m, light space
+    vec3 n;       // unit geometric normal, light space, towards the viewer
+    float depth;  // hardware depth of the camera, reversed
+    ivec2 pixel;
+};
+
+Surface surface_at(ivec2 pixel, float depth)
+{
+    Surface s;
+    s.pixel = pixel;
+    s.depth = depth;
+    s.p = unproject(light.clip_to_light, pixel_to_ndc(pixel), depth);
+    s.n = mat3(light.world_to_light) * octahedral_decode(texelFetch(g_normal, pixel, 0).xy);
+    return s;
+}
+
+// Distance of the pixel's surface along the view axis, m.
+float surface_view_distance(Surface s)
+{
+    vec3 world = unproject(view.clip_to_world, pixel_to_ndc(s.pixel), s.depth);
+    return dot(world - view.eye.xyz, view.forward.xyz);
+}

@@ -1,0 +1,77 @@
+/* The contract between the frame and a shadow method: fill one visibility texture per light.
+ *
+ * vis, RGBA16F: rgb = mean over the light's area of emission x visibility; a = mean visibility
+ * (1 = lit). A new method is one .c in renderer/techniques/, its .glsl, and a line in
+ * registry.def. */
+#pragma once
+#include "protocol/result.h"
+#include "protocol/technique_info.h"
+#include "renderer/gl/program.h"
+#include "renderer/gl/texture.h"
+#include "renderer/gl/timer.h"
+#include "renderer/light.h"
+#include "renderer/scene.h"
+#include "renderer/view.h"
+
+struct shadow_cache;
+
+/* Per renderer: lives as long as the context. */
+struct technique_ctx {
+    struct gl_programs *programs;
+    struct gl_samplers samplers;
+    struct gl_timer timer;
+    struct shadow_cache *shadows;
+    struct pen_device_info device;
+    GLuint empty_array;   /* vertex array for passes that make their own vertices */
+    GLuint light_block, param_block; /* uniform buffers, GL_UBO_LIGHT and GL_UBO_PARAMS */
+    struct gl_texture white; /* 1 x 1, bound where a light has no emission texture */
+};
+
+struct gbuffer {
+    struct gl_texture depth;    /* D32F, reversed, 0: background */
+    struct gl_texture normal;   /* RGBA16F: octahedral geometric normal, octahedral shading normal */
+    struct gl_texture albedo;   /* RGBA8: square root of albedo, flags */
+    struct gl_texture surface;  /* RGBA8: roughness, metallic, occlusion, specular scale */
+    struct gl_texture emission; /* R11G11B10F; only when the scene has any */
+    GLuint framebuffer;
+};
+
+/* One call of a method: one face of one light of one frame. */
+struct technique_run {
+    struct technique_ctx *ctx;
+    struct scene *scene;
+    const struct view *view;
+    const struct gbuffer *gbuffer;
+    const struct light *light;
+    const struct light_face *face;
+    const struct pen_request *request;
+    const struct technique *technique;
+    const void *params;      /* the method's own struct, also bound as GL_UBO_PARAMS */
+    void *state;             /* state_size bytes, zeroed when the renderer starts */
+    GLuint vis_framebuffer;  /* bound; pixels already 1; only this face's receivers may be written */
+    const struct gl_texture *emission; /* of the light, with mips, or ctx->white */
+    struct pen_result *result;         /* warnings and counts */
+    uint32_t width, height;            /* px of vis and G-buffer */
+};
+
+struct technique {
+    struct pen_technique_info info;
+    size_t state_size;
+    bool (*create)(struct technique_ctx *, void *state, struct pen_error *); /* optional */
+    bool (*record)(struct technique_run *, struct pen_error *);
+    void (*destroy)(struct technique_ctx *, void *state); /* optional */
+};
+
+extern const struct technique *const technique_registry[]; /* NULL-terminated */
+
+/* Texture units of screen passes. */
+enum {
+    UNIT_DEPTH,     /* gbuffer.depth */
+    UNIT_NORMAL,    /* gbuffer.normal */
+    UNIT_ALBEDO,
+    UNIT_SURFACE,
+    UNIT_EMITTED,   /* gbuffer.emission */
+    UNIT_EMISSION,  /* emission texture of the light */
+    UNIT_SHADOW,    /* the method's depth map, nearest, border 1 */
+    UNIT_FREE       /* first of eight units that are the method's own */
+};

@@ -1,0 +1,36 @@
+#include "renderer/passes/passes.h"
+#include "renderer/techniques/map_params.h"
+
+struct hard {
+    uint32_t map_size;
+    float bias;
+};
+
+static const struct pen_param rows[] = {
+    MAP_SIZE_ROW(struct hard, 2048),
+    BIAS_ROW(struct hard),
+};
+
+static bool record(struct technique_run *run, struct pen_error *error)
+{
+    const struct hard *params = run->params;
+    const struct shadow_input *map = pass_depth_map(run, params->map_size, error);
+    return map &&
+        pass_screen(run,
+            &(struct pass_screen){
+                .name = "hard", .body = "hard.glsl", .shadow = &map->textures[0]},
+            error);
+}
+
+const struct technique technique_hard = {
+    .info = {.name = "hard",
+        .title = "Shadow map",
+        .summary = "One depth comparison per pixel, seen from the centre of the light.",
+        .citation = "L. Williams, Casting curved shadows on curved surfaces, SIGGRAPH 1978",
+        .artefacts = "Hard, jagged edges whatever the size of the light.",
+        .cost_class = PEN_COST_CHEAP,
+        .textured = false,
+        .struct_size = sizeof(struct hard),
+        .params = {rows, sizeof rows / sizeof *rows}},
+    .record = record,
+};

@@ -1,0 +1,6 @@
+if(PENUMBRA_DAEMON)
+    foreach(subject request query scan result openapi routes)
+        penumbra_unit_test(documents_${subject} documents_${subject}.c documents_catalogue.c
+            LIBS penumbra_documents PkgConfig::cjson)
+    endforeach()
+endif()

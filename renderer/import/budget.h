@@ -1,0 +1,33 @@
+/* What one upload may ask for. Chosen so that an import that keeps to them fits in the 2 GiB and
+ * the 60 s that the importer is given by default, and so that a lie about a size is refused from
+ * the header that tells it, before anything is allocated. */
+#pragma once
+
+#define IMP_MAX_JSON_BYTES (512u << 20) /* data URIs count */
+#define IMP_MAX_JSON_DEPTH 64
+#define IMP_MAX_JSON_VALUES (6u << 20)
+
+#define IMP_MAX_ZIP_BYTES (1ull << 30)       /* unpacked, all entries together */
+#define IMP_MAX_ZIP_RATIO 200                /* of an entry that unpacks to more than ... */
+#define IMP_ZIP_RATIO_FROM_BYTES (16u << 20) /* ... this */
+
+#define IMP_MAX_NODES 1000000u
+#define IMP_MAX_NODE_DEPTH 1024u
+#define IMP_MAX_INSTANCES 1000000u /* uses of a primitive */
+#define IMP_MAX_PRIMITIVES 262144u
+#define IMP_MAX_ITEMS 524288u /* of each other array of the document */
+#define IMP_MAX_MATERIALS 65536u
+#define IMP_MAX_LIGHTS 1024u /* uses of a light; of a camera likewise */
+#define IMP_MAX_INDICES                                                                            \
+    96000000ull /* after strips and fans are unrolled, all primitives together */
+#define IMP_MAX_VERTICES 16000000ull         /* used by some index, all primitives together */
+#define IMP_MAX_ACCESSOR 96000000u           /* elements of one POSITION accessor, used or not */
+#define IMP_MAX_MESHOPT_BYTES (512ull << 20) /* unpacked, all views together */
+
+#define IMP_MAX_IMAGES 4096u
+#define IMP_MAX_IMAGE_PIXELS (64ull << 20)  /* px, one image */
+#define IMP_MAX_TOTAL_PIXELS (256ull << 20) /* px, all images as uploaded */
+#define IMP_KEEP_TOTAL_PIXELS (96ull << 20) /* px; beyond it the largest images are halved */
+#define IMP_MAX_IMAGE_SIDE 16384u           /* px, as in the blob; larger ones are halved */
+
+#define IMP_MAX_WARNINGS 64

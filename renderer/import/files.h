@@ -1,0 +1,53 @@
+/* The files of one upload: a bundle's or a zip's entries. A glTF document can name these and
+ * nothing else; no name ever reaches the file system. */
+#pragma once
+#include "protocol/error.h"
+#include <stddef.h>
+
+struct imp_bytes {
+    const uint8_t *data;
+    size_t bytes;
+};
+
+struct zip;
+
+struct imp_file {
+    char *name;          /* owned, NUL-terminated, no NUL inside */
+    const uint8_t *data; /* NULL: still in the zip */
+    size_t bytes;
+    uint64_t zip_entry;
+    uint8_t *owned; /* unpacked from the zip */
+};
+
+struct imp_files {
+    struct imp_file *items;
+    uint32_t count;
+    struct zip *zip;
+    uint64_t unpacked_bytes;
+};
+
+/* Reads the table of a bundle (bundle.h) or zip; the data must outlive *files. On failure *files is
+ * empty. Errors: PEN_UNPROCESSABLE (damaged, unsafe or duplicate names, encrypted), PEN_TOO_LARGE.
+ */
+bool imp_files_open_bundle(
+    struct imp_files *files, const uint8_t *data, size_t bytes, struct pen_error *error);
+bool imp_files_open_zip(
+    struct imp_files *files, const uint8_t *data, size_t bytes, struct pen_error *error);
+void imp_files_finish(struct imp_files *files);
+
+/* The .glb or .gltf to import: the one nearest to the root; PEN_UNPROCESSABLE when there is none,
+ * or more than one there. */
+const struct imp_file *imp_files_document(struct imp_files *files, struct pen_error *error);
+/* What `uri` (percent-encoded, relative to the folder of the file called `base`) names. A file that
+ * is not where the URI says is taken by its last part when that is unique, as forms often drop the
+ * folders. Errors, at `pointer`: PEN_UNPROCESSABLE for absolute or outside URIs and files that were
+ * not uploaded. */
+bool imp_files_resolve(struct imp_files *files, const char *base, const char *uri,
+    const char *pointer, struct imp_bytes *found, struct pen_error *error);
+/* Unpacks the file when needed. Errors: PEN_TOO_LARGE (zip bomb), PEN_UNPROCESSABLE (damaged). */
+bool imp_files_load(struct imp_files *files, const struct imp_file *file, struct imp_bytes *found,
+    struct pen_error *error);
+
+/* True for a relative name of '/'-separated parts, none empty, "." or "..", without control
+ * characters, backslashes or a drive. */
+bool imp_name_is_safe(const char *name, size_t bytes);

@@ -1,0 +1,24 @@
+/* The triangles of one glTF primitive on their way into the blob. */
+#pragma once
+#include <stdint.h>
+
+struct imp_geometry {
+    float (*positions)[3];
+    float (*normals)[3]; /* each of these may be NULL */
+    float (*tangents)[4];
+    float (*uv[2])[2];
+    float (*colors)[4];
+    uint32_t vertex_count;
+    uint32_t *indices;
+    uint32_t index_count;
+    uint32_t *meshlet_triangles; /* NULL: none were built */
+    uint32_t meshlet_count;
+};
+
+void imp_geometry_finish(struct imp_geometry *geometry);
+
+/* optimise.c: welds equal vertices, orders triangles into meshlets of at most
+ * IMP_MESHLET_TRIANGLES (compact ones with narrow normal cones, in an order kind to the vertex
+ * cache) and vertices by first use. The set of triangles stays the same. */
+void imp_geometry_optimise(struct imp_geometry *geometry);
+#define IMP_MESHLET_TRIANGLES 124

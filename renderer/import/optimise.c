@@ -1,0 +1,95 @@
+#include "renderer/import/geometry.h"
+#include "renderer/import/memory.h"
+#include <meshoptimizer.h>
+
+#define MESHLET_VERTICES 128
+#define CONE_WEIGHT 0.5f
+
+struct stream {
+    void **data;
+    size_t item_bytes;
+};
+
+static unsigned list_streams(struct imp_geometry *g, struct stream streams[6])
+{
+    const struct stream all[] = {{(void **)&g->positions, sizeof *g->positions},
+        {(void **)&g->normals, sizeof *g->normals}, {(void **)&g->tangents, sizeof *g->tangents},
+        {(void **)&g->uv[0], sizeof *g->uv[0]}, {(void **)&g->uv[1], sizeof *g->uv[1]},
+        {(void **)&g->colors, sizeof *g->colors}};
+    unsigned count = 0;
+    for (unsigned i = 0; i < 6; i++)
+        if (*all[i].data)
+            streams[count++] = all[i];
+    return count;
+}
+
+static void apply_remap(struct imp_geometry *g, const unsigned *remap, size_t new_count)
+{
+    struct stream streams[6];
+    unsigned count = list_streams(g, streams);
+    for (unsigned i = 0; i < count; i++) {
+        void *moved = imp_alloc(new_count, streams[i].item_bytes);
+        meshopt_remapVertexBuffer(
+            moved, *streams[i].data, g->vertex_count, streams[i].item_bytes, remap);
+        free(*streams[i].data);
+        *streams[i].data = moved;
+    }
+    meshopt_remapIndexBuffer(g->indices, g->indices, g->index_count, remap);
+    g->vertex_count = (uint32_t)new_count;
+}
+
+static void weld(struct imp_geometry *g, unsigned *remap)
+{
+    struct stream streams[6];
+    struct meshopt_Stream views[6];
+    unsigned count = list_streams(g, streams);
+    for (unsigned i = 0; i < count; i++)
+        views[i] =
+            (struct meshopt_Stream){*streams[i].data, streams[i].item_bytes, streams[i].item_bytes};
+    size_t unique = meshopt_generateVertexRemapMulti(
+        remap, g->indices, g->index_count, g->vertex_count, views, count);
+    apply_remap(g, remap, unique);
+}
+
+/* Replaces the indices by those of the meshlets; leaves all as it was when the meshlets miss
+ * triangles, as they do when areas overflow. */
+static void build_meshlets(struct imp_geometry *g)
+{
+    size_t bound =
+        meshopt_buildMeshletsBound(g->index_count, MESHLET_VERTICES, IMP_MESHLET_TRIANGLES);
+    struct meshopt_Meshlet *meshlets = imp_alloc(bound, sizeof *meshlets);
+    unsigned *vertices = imp_alloc(bound, MESHLET_VERTICES * sizeof *vertices);
+    unsigned char *triangles = imp_alloc(bound, IMP_MESHLET_TRIANGLES * 3);
+    size_t count = meshopt_buildMeshlets(meshlets, vertices, triangles, g->indices, g->index_count,
+        g->positions[0], g->vertex_count, sizeof *g->positions, MESHLET_VERTICES,
+        IMP_MESHLET_TRIANGLES, CONE_WEIGHT);
+    size_t covered = 0;
+    for (size_t i = 0; i < count; i++)
+        covered += meshlets[i].triangle_count;
+    if (covered * 3 == g->index_count) {
+        g->meshlet_triangles = imp_alloc(count, sizeof *g->meshlet_triangles);
+        g->meshlet_count = (uint32_t)count;
+        uint32_t *out = g->indices;
+        for (size_t i = 0; i < count; i++) {
+            const struct meshopt_Meshlet *m = &meshlets[i];
+            g->meshlet_triangles[i] = m->triangle_count;
+            for (size_t k = 0; k < 3 * (size_t)m->triangle_count; k++)
+                *out++ = vertices[m->vertex_offset + triangles[m->triangle_offset + k]];
+        }
+    }
+    free(meshlets);
+    free(vertices);
+    free(triangles);
+}
+
+void imp_geometry_optimise(struct imp_geometry *g)
+{
+    unsigned *remap = imp_alloc(g->vertex_count, sizeof *remap);
+    weld(g, remap);
+    meshopt_optimizeVertexCache(g->indices, g->indices, g->index_count, g->vertex_count);
+    build_meshlets(g);
+    size_t used =
+        meshopt_optimizeVertexFetchRemap(remap, g->indices, g->index_count, g->vertex_count);
+    apply_remap(g, remap, used);
+    free(remap);
+}

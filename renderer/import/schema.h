@@ -1,0 +1,15 @@
+/* Checks the shape of a glTF document before anything relies on it: depth and size of the JSON, the
+ * type and range of every property that the importer reads, and every index into another array. */
+#pragma once
+#include "protocol/error.h"
+#include <stddef.h>
+
+struct cJSON;
+
+/* Reads the text once, without recursion. Errors: PEN_UNPROCESSABLE (nested more than
+ * IMP_MAX_JSON_DEPTH deep, unbalanced), PEN_TOO_LARGE (more than IMP_MAX_JSON_VALUES values). */
+bool imp_json_scan(const char *text, size_t bytes, struct pen_error *error);
+
+/* `root` is changed: every "extras" is removed. Errors: PEN_UNPROCESSABLE at the JSON pointer of
+ * the offending value, PEN_TOO_LARGE for an array longer than budget.h allows. */
+bool imp_schema_check(struct cJSON *root, struct pen_error *error);

@@ -1,6 +1,8 @@
 #include "server/importer.h"
+#include "protocol/request.h"
 #include "renderer/import/import_process.h"
 #include "server/clock.h"
+#include "server/describe.h"
 #include "server/log.h"
 #include "server/process.h"
 #include <errno.h>
@@ -135,8 +137,7 @@ static bool import(struct importer *importer, struct import_task *task,
         pen_fail(error, PEN_UNAVAILABLE, "", "The store could not be written.");
     ok = ok && run_process(importer, task, source_fd, blob_fd, error);
     if (ok)
-        meta = importer->config.describe(importer->config.context, task->kind, task->id, blob_fd,
-            (uint64_t)status.st_size, error);
+        meta = describe_blob(task->kind, task->id, blob_fd, (uint64_t)status.st_size, error);
     ok = ok && meta;
     if (ok && !write_meta(staging->folder, meta))
         ok = pen_fail(error, PEN_UNAVAILABLE, "", "The store could not be written.");

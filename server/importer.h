@@ -21,10 +21,6 @@ struct importer_config {
     struct scene_store *store;
     uint32_t processes, queue_limit;
     uint64_t timeout_ms, memory_bytes, cpu_seconds;
-    /* meta.json of a new blob, malloc'd. */
-    char *(*describe)(void *context, enum store_kind kind, const uint8_t id[PEN_ID_BYTES],
-        int blob_fd, uint64_t source_bytes, struct pen_error *error);
-    void *context;
 };
 
 struct importer;

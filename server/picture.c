@@ -6,6 +6,18 @@
 #include <sys/mman.h>
 #include <sys/stat.h>
 
+static char build[PEN_ID_HEX + 1]; /* set once, before the first thread */
+
+void picture_set_build(const char text[PEN_ID_HEX + 1])
+{
+    memcpy(build, text, sizeof build);
+}
+
+const char *picture_build(void)
+{
+    return build;
+}
+
 struct picture *picture_create(
     int memfd, const struct pen_result *result, const char *tag, struct pen_error *error)
 {
@@ -57,7 +69,7 @@ void picture_tag(const struct pen_request *request, const struct pen_device_info
     char tag[PEN_ID_HEX + 1])
 {
     struct hash *hash = hash_create();
-    hash_add(hash, PENUMBRA_BUILD, sizeof PENUMBRA_BUILD);
+    hash_add(hash, build, sizeof build);
     hash_add(hash, device->renderer, strnlen(device->renderer, sizeof device->renderer));
     hash_add(hash, "", 1);
     hash_add(hash, device->version, strnlen(device->version, sizeof device->version));

@@ -21,6 +21,9 @@ void picture_release(struct picture *picture); /* NULL is fine */
 /* What it costs to keep, in bytes. */
 size_t picture_cost(const struct picture *picture);
 
+/* Names the program that makes the pixels: a new build gives new tags. Before the first thread. */
+void picture_set_build(const char text[PEN_ID_HEX + 1]);
+const char *picture_build(void);
 /* The strong ETag of what a request gives on a device: build, device and key bytes, hashed. */
 void picture_tag(const struct pen_request *request, const struct pen_device_info *device,
     char tag[PEN_ID_HEX + 1]);

@@ -95,6 +95,7 @@ static void upload_view(struct frame *f, uint32_t number)
     memcpy(b.eye, v->eye, 12);
     b.eye[3] = 0.5f * (float)r->height / tanf(0.5f * v->fov_y_rad);
     memcpy(b.forward, v->forward, 12);
+    b.forward[3] = v->near_z;
     b.viewport[0] = (float)r->width, b.viewport[1] = (float)r->height;
     b.viewport[2] = 1 / b.viewport[0], b.viewport[3] = 1 / b.viewport[1];
     memcpy(b.ambient, r->ambient, 12);
@@ -105,7 +106,7 @@ static void upload_view(struct frame *f, uint32_t number)
     bool empty = scene_is_empty(f->job->scene);
     b.ground[0] = center[0], b.ground[2] = center[2];
     /* A hair below the bounds, so that a floor of the scene itself hides it. */
-    b.ground[1] = (empty ? 0 : f->job->scene->blob.header->bounds_min[1]) - 2e-3f * radius;
+    b.ground[1] = (empty ? 0 : f->job->scene->blob.header->bounds_min[1]) - 1e-4f * radius;
     b.ground[3] = 12 * radius;
     b.display[0] = exp2f(r->exposure_ev);
     b.display[1] = (float)r->tone_map;

@@ -300,7 +300,7 @@ static void auto_light(struct pen_light *light, const struct scene *scene)
     float center[3], radius = scene_radius(scene);
     pen_light_default(light, PEN_LIGHT_RECT);
     scene_center(scene, center);
-    static const float direction[3] = {0.52f, 0.80f, 0.30f};
+    static const float direction[3] = {0.62f, 0.75f, -0.23f};
     float distance = 2.4f * radius;
     for (int i = 0; i < 3; i++) {
         light->target[i] = center[i];

@@ -2,11 +2,13 @@
  * numbers are finite and indices in range where the schema names them; everything that depends on
  * two properties together is still for the caller to check. */
 #pragma once
-#include "protocol/error.h"
+#include <stdbool.h>
 #include <stddef.h>
+#include <stdint.h>
 #ifdef __cplusplus
 extern "C" {
 #endif
+#include "protocol/error.h"
 
 #define GLTF_NAME_BYTES 60
 

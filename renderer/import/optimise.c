@@ -72,9 +72,14 @@ static void build_meshlets(struct imp_geometry *g)
         uint32_t *out = g->indices;
         for (size_t i = 0; i < count; i++) {
             const struct meshopt_Meshlet *m = &meshlets[i];
+            unsigned local[3 * IMP_MESHLET_TRIANGLES];
+            size_t n = 3 * (size_t)m->triangle_count;
             g->meshlet_triangles[i] = m->triangle_count;
-            for (size_t k = 0; k < 3 * (size_t)m->triangle_count; k++)
-                *out++ = vertices[m->vertex_offset + triangles[m->triangle_offset + k]];
+            for (size_t k = 0; k < n; k++)
+                local[k] = triangles[m->triangle_offset + k];
+            meshopt_optimizeVertexCache(local, local, n, m->vertex_count);
+            for (size_t k = 0; k < n; k++)
+                *out++ = vertices[m->vertex_offset + local[k]];
         }
     }
     free(meshlets);

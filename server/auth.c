@@ -39,8 +39,8 @@ struct auth *auth_load(const char *path, struct pen_error *error)
             continue;
         const char *token = second ? second : first;
         if (strlen(token) < MIN_TOKEN) {
-            pen_fail(error, PEN_UNPROCESSABLE, "", "A token has fewer than %d characters.",
-                MIN_TOKEN);
+            pen_fail(
+                error, PEN_UNPROCESSABLE, "", "A token has fewer than %d characters.", MIN_TOKEN);
             goto fail;
         }
         auth->digests = realloc(auth->digests, (auth->count + 1) * sizeof *auth->digests);

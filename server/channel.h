@@ -14,9 +14,9 @@ enum channel_kind {
     CHANNEL_WARM,      /* worker: warmed up */
     CHANNEL_STARTED,   /* worker: the GL thread takes this job */
     CHANNEL_RENDERED,  /* worker: the GL thread is done with it, encoding follows */
-    CHANNEL_DONE,      /* worker: the answer; one descriptor, a sealed memfd, when there is an image */
-    CHANNEL_JOB,       /* front end: descriptors: the scene's blob, then `image_count` images */
-    CHANNEL_DROP,      /* front end: the scene was deleted */
+    CHANNEL_DONE, /* worker: the answer; one descriptor, a sealed memfd, when there is an image */
+    CHANNEL_JOB,  /* front end: descriptors: the scene's blob, then `image_count` images */
+    CHANNEL_DROP, /* front end: the scene was deleted */
     CHANNEL_KINDS
 };
 

@@ -200,8 +200,7 @@ bool config_read(struct config *config, int argc, char **argv, struct pen_error 
             return false;
     }
     if (!*config->tls_cert != !*config->tls_key)
-        return pen_fail(
-            error, PEN_UNPROCESSABLE, "", "--tls-cert and --tls-key go together.");
+        return pen_fail(error, PEN_UNPROCESSABLE, "", "--tls-cert and --tls-key go together.");
     return true;
 }
 

@@ -77,8 +77,8 @@ static const char *admit(struct door *door, int fd, const struct sockaddr_storag
     struct in6_addr address = address_of(from);
     uint32_t same = 0;
     for (int i = 0; i < door->capacity; i++)
-        same += door->entries[i].used &&
-                !memcmp(&door->entries[i].address, &address, sizeof address);
+        same +=
+            door->entries[i].used && !memcmp(&door->entries[i].address, &address, sizeof address);
     if (door->numbers.open >= door->config.connections)
         return "503 Service Unavailable";
     if (same >= door->config.connections_per_address)
@@ -123,8 +123,7 @@ static void add_lingerer(struct door *door, int fd)
         close(fd);
         return;
     }
-    door->lingering[door->lingering_count++] =
-        (struct lingerer){fd, clock_now_ns() + LINGER_NS, 0};
+    door->lingering[door->lingering_count++] = (struct lingerer){fd, clock_now_ns() + LINGER_NS, 0};
 }
 
 /* Accepts everything that is queued. */
@@ -165,13 +164,12 @@ static bool is_too_slow(const struct door *door, const struct entry *entry, uint
     uint64_t age = now - entry->since_ns;
     switch (entry->state) {
     case DOOR_WAITING:
-        return age >
-               (entry->served ? config->keep_alive_ms : config->header_timeout_ms) * CLOCK_MS;
+        return age > (entry->served ? config->keep_alive_ms : config->header_timeout_ms) * CLOCK_MS;
     case DOOR_HEADER:
         return age > config->header_timeout_ms * CLOCK_MS;
     case DOOR_BODY:
-        return age > BODY_GRACE_NS &&
-               (double)entry->bytes < (double)(age - BODY_GRACE_NS) / 1e9 * (double)config->body_rate;
+        return age > BODY_GRACE_NS && (double)entry->bytes < (double)(age - BODY_GRACE_NS) / 1e9 *
+                                                                 (double)config->body_rate;
     case DOOR_SENDING:
         return age > SEND_GRACE_NS + entry->bytes / SEND_RATE * CLOCK_S;
     default:

@@ -98,8 +98,8 @@ static bool check_framing(struct http_exchange *x, const char *version, struct p
         f.fault = "The length of the body is ambiguous.";
     if (!f.fault && (f.hosts > 1 || (http11 && f.hosts == 0)))
         f.fault = "There must be exactly one Host.";
-    bool can_have_body = !strcmp(x->method, "POST") || !strcmp(x->method, "PUT") ||
-                         !strcmp(x->method, "PATCH");
+    bool can_have_body =
+        !strcmp(x->method, "POST") || !strcmp(x->method, "PUT") || !strcmp(x->method, "PATCH");
     if (!f.fault && !can_have_body && (f.chunked || f.length))
         f.fault = "This method has no body.";
     x->content_length = f.chunked ? HTTP_UNKNOWN_LENGTH : f.length;
@@ -153,8 +153,8 @@ void http_add_header(struct http_exchange *x, const char *name, const char *form
     va_end(args);
 }
 
-void http_answer(struct http_exchange *x, uint32_t status, const char *content_type,
-    struct http_body body)
+void http_answer(
+    struct http_exchange *x, uint32_t status, const char *content_type, struct http_body body)
 {
     if (content_type)
         http_add_header(x, "Content-Type", "%s", content_type);
@@ -207,8 +207,8 @@ static enum MHD_Result queue(struct http_exchange *x)
         return MHD_NO;
     bool complete = true;
     for (uint32_t i = 0; i < x->header_count; i++)
-        complete = complete && MHD_add_response_header(response, x->headers[i].name,
-                                   x->headers[i].value) == MHD_YES;
+        complete = complete && MHD_add_response_header(
+                                   response, x->headers[i].name, x->headers[i].value) == MHD_YES;
     if (x->closes || is_draining(listener))
         MHD_add_response_header(response, "Connection", "close");
     x->queued = true;
@@ -293,9 +293,8 @@ static enum MHD_Result begin(struct http_exchange *x, const char *method, const 
     return queue(x);
 }
 
-static enum MHD_Result on_request(void *context, struct MHD_Connection *connection,
-    const char *url, const char *method, const char *version, const char *data, size_t *bytes,
-    void **user)
+static enum MHD_Result on_request(void *context, struct MHD_Connection *connection, const char *url,
+    const char *method, const char *version, const char *data, size_t *bytes, void **user)
 {
     (void)context, (void)url, (void)connection;
     struct http_exchange *x = *user;
@@ -370,7 +369,8 @@ static void no_log(void *context, const char *format, va_list args)
     (void)context, (void)format, (void)args; /* its messages are about clients, not about us */
 }
 
-struct http_listener *http_listener_create(const struct http_config *config, struct pen_error *error)
+struct http_listener *http_listener_create(
+    const struct http_config *config, struct pen_error *error)
 {
     struct http_listener *listener = calloc(1, sizeof *listener);
     if (!listener)

@@ -25,13 +25,13 @@ struct http_header {
 struct http_exchange {
     struct http_listener *listener;
     const char *method;
-    char *path;  /* as sent, up to '?'; nothing decoded */
-    char *query; /* as sent, behind '?', or NULL */
+    char *path;      /* as sent, up to '?'; nothing decoded */
+    char *query;     /* as sent, behind '?', or NULL */
     char client[64]; /* numeric address */
     char request_id[33];
-    uint64_t content_length; /* 0: no body, HTTP_UNKNOWN_LENGTH: chunked */
+    uint64_t content_length;     /* 0: no body, HTTP_UNKNOWN_LENGTH: chunked */
     uint64_t header_ns, body_ns; /* when the header and the body were complete */
-    void *user; /* the owner's */
+    void *user;                  /* the owner's */
     /* The answer, for the log: */
     uint32_t status;
     struct http_body body;
@@ -66,7 +66,8 @@ struct http_config {
     char *cert_pem, *key_pem; /* both NULL: no TLS; must outlive the listener */
 };
 
-struct http_listener *http_listener_create(const struct http_config *config, struct pen_error *error);
+struct http_listener *http_listener_create(
+    const struct http_config *config, struct pen_error *error);
 void *http_listener_context(const struct http_listener *listener);
 struct door *http_listener_door(const struct http_listener *listener);
 /* Exchanges between `begin` and `completed`. */

@@ -54,8 +54,7 @@ static bool judge(struct importer *importer, int status, const struct pen_error 
         if (report->code == PEN_OK)
             return true;
         bool sane = report->code >= 400 && report->code < 600;
-        return pen_fail(error, sane ? report->code : PEN_INTERNAL,
-            report->pointer, "%.*s",
+        return pen_fail(error, sane ? report->code : PEN_INTERNAL, report->pointer, "%.*s",
             (int)strnlen(report->message, sizeof report->message), report->message);
     }
     count(importer, &importer->numbers.crashed);

@@ -50,8 +50,8 @@ void log_event(enum log_level level, const char *format, ...)
     va_end(args);
     time_stamp(stamp);
     if (log_format == CONFIG_LOG_TEXT) {
-        int n = snprintf(line, sizeof line, "%s %s %s\n", stamp,
-            level == LOG_ERROR ? "error" : "info", message);
+        int n = snprintf(
+            line, sizeof line, "%s %s %s\n", stamp, level == LOG_ERROR ? "error" : "info", message);
         put(line, n < (int)sizeof line ? (size_t)n : sizeof line - 1);
         return;
     }

@@ -141,11 +141,11 @@ void metrics_print(struct metrics_text *text, const char *format, ...)
     text->size += bytes;
 }
 
-void metrics_print_one(struct metrics_text *text, const char *name, const char *type,
-    const char *help, double value)
+void metrics_print_one(
+    struct metrics_text *text, const char *name, const char *type, const char *help, double value)
 {
-    metrics_print(text, "# HELP %s %s\n# TYPE %s %s\n%s %.17g\n", name, help, name, type, name,
-        value);
+    metrics_print(
+        text, "# HELP %s %s\n# TYPE %s %s\n%s %.17g\n", name, help, name, type, name, value);
 }
 
 /* `labels` is "" or "route=\"/v1\"". */
@@ -192,9 +192,10 @@ void metrics_write(struct metrics *m, struct metrics_text *text)
         snprintf(labels, sizeof labels, "route=\"%s\"", copy->routes[r].route);
         write_histogram(text, "penumbra_request_seconds", labels, &copy->routes[r].times);
     }
-    metrics_print(text, "# HELP penumbra_render_overhead_seconds HTTP, JSON, queue and transport of "
-                        "a render: the total minus all stages but the queue's.\n"
-                        "# TYPE penumbra_render_overhead_seconds histogram\n");
+    metrics_print(text,
+        "# HELP penumbra_render_overhead_seconds HTTP, JSON, queue and transport of "
+        "a render: the total minus all stages but the queue's.\n"
+        "# TYPE penumbra_render_overhead_seconds histogram\n");
     write_histogram(text, "penumbra_render_overhead_seconds", "", &copy->overhead);
     metrics_print(text, "# HELP penumbra_renders_total Images rendered.\n"
                         "# TYPE penumbra_renders_total counter\n");

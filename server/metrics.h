@@ -22,8 +22,8 @@ struct metrics_text {
 void metrics_print(struct metrics_text *text, const char *format, ...)
     __attribute__((format(printf, 2, 3)));
 /* "# HELP", "# TYPE" and one unlabelled sample. */
-void metrics_print_one(struct metrics_text *text, const char *name, const char *type,
-    const char *help, double value);
+void metrics_print_one(
+    struct metrics_text *text, const char *name, const char *type, const char *help, double value);
 /* Everything that metrics.c itself counts. */
 void metrics_write(struct metrics *metrics, struct metrics_text *text);
 /* Rolling per-method and per-stage timings of the last renders; malloc'd JSON. */

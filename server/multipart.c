@@ -154,8 +154,8 @@ static bool step(struct multipart *m, bool *progress, struct pen_error *error)
         return true;
     }
     char *mark = memmem(m->buffer, m->used, m->mark, m->mark_bytes);
-    size_t data = mark ? (size_t)(mark - m->buffer)
-                       : (m->used > m->mark_bytes ? m->used - m->mark_bytes : 0);
+    size_t data =
+        mark ? (size_t)(mark - m->buffer) : (m->used > m->mark_bytes ? m->used - m->mark_bytes : 0);
     if (data) {
         if (m->where == DATA && m->wanted && !m->sink.data(m->sink.context, m->buffer, data, error))
             return false;

@@ -4,8 +4,8 @@
 #include <sys/types.h>
 
 struct process {
-    pid_t pid;  /* 0: none */
-    int pidfd;  /* readable when it has ended */
+    pid_t pid; /* 0: none */
+    int pidfd; /* readable when it has ended */
 };
 
 struct process_fd {

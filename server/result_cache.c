@@ -6,8 +6,8 @@
 #define BUCKETS 1024
 
 struct entry {
-    struct entry *chain;          /* same bucket */
-    struct entry *newer, *older;  /* in order of use */
+    struct entry *chain;         /* same bucket */
+    struct entry *newer, *older; /* in order of use */
     struct picture *picture;
 };
 

@@ -212,8 +212,8 @@ static void read_trace(struct call *call)
 static bool authorise(struct call *call, struct pen_error *error)
 {
     const struct service *s = call->service;
-    bool open = call->route == ROUTE_HOME || call->route == ROUTE_DOCS ||
-                call->route == PEN_ROUTE_OPENAPI;
+    bool open =
+        call->route == ROUTE_HOME || call->route == ROUTE_DOCS || call->route == PEN_ROUTE_OPENAPI;
     uint64_t hash = 1469598103934665603u; /* FNV-1a of the address: clients without a token */
     for (const char *c = call->exchange->client; *c; c++)
         hash = (hash ^ (uint8_t)*c) * 1099511628211u;
@@ -241,11 +241,10 @@ static bool check_body(struct call *call, struct pen_error *error)
                             (length > 17 && !strncasecmp(type, "application/", 12) &&
                                 !strncasecmp(type + length - 5, "+json", 5)));
     if (type && !json)
-        return pen_fail(
-            error, PEN_UNSUPPORTED_MEDIA, "", "A render request is application/json.");
+        return pen_fail(error, PEN_UNSUPPORTED_MEDIA, "", "A render request is application/json.");
     if (x->content_length != HTTP_UNKNOWN_LENGTH && x->content_length > PEN_MAX_JSON_BYTES)
-        return pen_fail(error, PEN_TOO_LARGE, "", "A render request has at most %d bytes.",
-            PEN_MAX_JSON_BYTES);
+        return pen_fail(
+            error, PEN_TOO_LARGE, "", "A render request has at most %d bytes.", PEN_MAX_JSON_BYTES);
     return true;
 }
 

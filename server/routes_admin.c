@@ -49,8 +49,7 @@ static void readyz(struct http_exchange *x, struct service *s)
     }
     uint64_t now = clock_now_ns();
     pthread_mutex_lock(&s->canary_lock);
-    bool recent =
-        s->canary_ns && now - s->canary_ns < s->config->canary_interval_ms * CLOCK_MS;
+    bool recent = s->canary_ns && now - s->canary_ns < s->config->canary_interval_ms * CLOCK_MS;
     bool failed = s->canary_failed;
     pthread_mutex_unlock(&s->canary_lock);
     if (recent && !failed) {
@@ -99,10 +98,11 @@ static void write_service(struct service *s, struct metrics_text *text)
         for (const char *c = pool.device.renderer; *c; c++)
             *to++ = *c == '"' || *c == '\\' || *c == '\n' ? '_' : *c;
         *to = 0;
-        metrics_print(text, "# HELP penumbra_device_info What renders.\n"
-                            "# TYPE penumbra_device_info gauge\n"
-                            "penumbra_device_info{renderer=\"%s\",platform=\"%s\",software=\"%u\","
-                            "version=\"" PENUMBRA_VERSION "\"} 1\n",
+        metrics_print(text,
+            "# HELP penumbra_device_info What renders.\n"
+            "# TYPE penumbra_device_info gauge\n"
+            "penumbra_device_info{renderer=\"%s\",platform=\"%s\",software=\"%u\","
+            "version=\"" PENUMBRA_VERSION "\"} 1\n",
             renderer, pool.device.platform, pool.device.software != 0);
     }
     const struct {

@@ -30,8 +30,8 @@ void routes_openapi(struct call *call)
     const struct service *s = call->service;
     http_add_header(call->exchange, "Cache-Control", "no-cache");
     if (!routes_not_modified(call, s->openapi_tag))
-        http_answer(call->exchange, 200, "application/json",
-            http_static(s->openapi, strlen(s->openapi)));
+        http_answer(
+            call->exchange, 200, "application/json", http_static(s->openapi, strlen(s->openapi)));
 }
 
 void routes_techniques(struct call *call)

@@ -215,8 +215,8 @@ void routes_result(struct call *call)
     if (!routes_not_modified(call, tag)) {
         struct http_body body = {
             picture->data, picture->size, release_picture, picture_reference(picture)};
-        http_answer(call->exchange, 200,
-            pen_format_mime[picture->result.completed.output.format], body);
+        http_answer(
+            call->exchange, 200, pen_format_mime[picture->result.completed.output.format], body);
     }
     picture_release(picture);
 }

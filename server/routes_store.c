@@ -95,8 +95,7 @@ void routes_import(struct call *call)
     struct import_task *task = &call->task;
     task->upload = call->upload;
     task->kind = kind_of(call);
-    task->expects_id =
-        call->route == PEN_ROUTE_SCENE_PUT || call->route == PEN_ROUTE_IMAGE_PUT;
+    task->expects_id = call->route == PEN_ROUTE_SCENE_PUT || call->route == PEN_ROUTE_IMAGE_PUT;
     memcpy(task->id, call->id, PEN_ID_BYTES);
     task->finish = finish;
     call->upload = NULL; /* the task's from here on */
@@ -108,9 +107,8 @@ void routes_import(struct call *call)
 }
 
 /* limit and after. */
-static bool read_page(
-    struct call *call, uint32_t *limit, uint8_t after[PEN_ID_BYTES], bool *has_after,
-    struct pen_error *error)
+static bool read_page(struct call *call, uint32_t *limit, uint8_t after[PEN_ID_BYTES],
+    bool *has_after, struct pen_error *error)
 {
     struct pen_query_pair pairs[ROUTES_MAX_PAIRS];
     uint32_t count;
@@ -149,8 +147,7 @@ void routes_list(struct call *call)
         return;
     }
     struct store_entry entries[MAX_PAGE + 1];
-    uint32_t count =
-        scene_store_list(store, kind, has_after ? after : NULL, entries, limit + 1);
+    uint32_t count = scene_store_list(store, kind, has_after ? after : NULL, entries, limit + 1);
     uint32_t shown = count > limit ? limit : count;
     struct pen_json json = {0};
     pen_json_object(&json, NULL);
@@ -177,8 +174,7 @@ void routes_list(struct call *call)
 void routes_describe(struct call *call)
 {
     struct pen_error error = {0};
-    char *text =
-        describe_stored(call->service->store, kind_of(call), call->id, &error);
+    char *text = describe_stored(call->service->store, kind_of(call), call->id, &error);
     if (text)
         routes_json(call, 200, text);
     else

@@ -85,8 +85,8 @@ static void remove_folder(int parent, const char *name)
         unlinkat(parent, name, 0);
 }
 
-static bool is_good_blob(int folder, enum store_kind kind, const uint8_t id[PEN_ID_BYTES],
-    uint64_t *bytes)
+static bool is_good_blob(
+    int folder, enum store_kind kind, const uint8_t id[PEN_ID_BYTES], uint64_t *bytes)
 {
     struct psc_header header;
     struct stat status;
@@ -104,19 +104,18 @@ static bool is_good_blob(int folder, enum store_kind kind, const uint8_t id[PEN_
 }
 
 /* Looks at one folder of the store; false when it is not a stored thing. */
-static bool inspect(struct scene_store *store, enum store_kind kind, const char *name,
-    struct store_entry *entry)
+static bool inspect(
+    struct scene_store *store, enum store_kind kind, const char *name, struct store_entry *entry)
 {
     memset(entry, 0, sizeof *entry);
     if (!pen_id_from_hex(name, entry->id))
         return false;
     struct stat status;
-    int folder =
-        openat(store->kinds[kind], name, O_RDONLY | O_DIRECTORY | O_CLOEXEC | O_NOFOLLOW);
+    int folder = openat(store->kinds[kind], name, O_RDONLY | O_DIRECTORY | O_CLOEXEC | O_NOFOLLOW);
     if (folder < 0)
         return false;
-    bool has_source = !fstatat(folder, STORE_SOURCE, &status, AT_SYMLINK_NOFOLLOW) &&
-                      S_ISREG(status.st_mode);
+    bool has_source =
+        !fstatat(folder, STORE_SOURCE, &status, AT_SYMLINK_NOFOLLOW) && S_ISREG(status.st_mode);
     entry->source_bytes = has_source ? (uint64_t)status.st_size : 0;
     entry->stored_unix_s = has_source ? status.st_mtim.tv_sec : 0;
     entry->stale = !is_good_blob(folder, kind, entry->id, &entry->blob_bytes);
@@ -197,8 +196,7 @@ fail:
 
 void scene_store_close(struct scene_store *store)
 {
-    const int fds[] = {store->root, store->tmp, store->lock_file, store->kinds[0],
-        store->kinds[1]};
+    const int fds[] = {store->root, store->tmp, store->lock_file, store->kinds[0], store->kinds[1]};
     for (size_t i = 0; i < sizeof fds / sizeof *fds; i++)
         if (fds[i] >= 0)
             close(fds[i]);

@@ -13,7 +13,7 @@ struct share {
 };
 
 struct scheduler {
-    pthread_mutex_t lock; /* guards everything below, and the waiters of every render */
+    pthread_mutex_t lock;       /* guards everything below, and the waiters of every render */
     struct render *queue[2][2]; /* [batch][first, last] */
     struct render *running;
     struct share *shares;
@@ -171,8 +171,8 @@ bool scheduler_submit(struct scheduler *s, const struct pen_request *request,
     } else if (waiter->client && s->limits.client_share && share &&
                share->used >= s->limits.client_share) {
         s->numbers.refused_share++;
-        pen_fail(error, PEN_TOO_MANY, "", "This client already has %u renders under way.",
-            share->used);
+        pen_fail(
+            error, PEN_TOO_MANY, "", "This client already has %u renders under way.", share->used);
     } else if (!render && s->numbers.queued >= s->limits.queue) {
         s->numbers.refused_full++;
         pen_fail(error, PEN_UNAVAILABLE, "", "The queue is full.");
@@ -297,8 +297,7 @@ void scheduler_return(struct scheduler *s, struct render *render)
         free(render);
 }
 
-void scheduler_finish(
-    struct scheduler *s, struct render *render, const struct outcome *outcome)
+void scheduler_finish(struct scheduler *s, struct render *render, const struct outcome *outcome)
 {
     struct outcome answer = *outcome;
     pthread_mutex_lock(&s->lock);

@@ -6,19 +6,19 @@
 
 /* How a render ended for one client. */
 struct outcome {
-    struct pen_error error;   /* PEN_OK: there is a picture */
-    struct picture *picture;  /* borrowed for the call */
+    struct pen_error error;  /* PEN_OK: there is a picture */
+    struct picture *picture; /* borrowed for the call */
     double queue_ms;
-    uint32_t retry_after_s;   /* with 429 and 503 */
-    bool shared;              /* another client's request rendered it */
+    uint32_t retry_after_s; /* with 429 and 503 */
+    bool shared;            /* another client's request rendered it */
 };
 
 /* One client waiting. The owner keeps it alive from a successful scheduler_submit until `finish`,
  * which is called exactly once, from any thread, with no lock held. */
 struct waiter {
     struct waiter *next;
-    uint64_t deadline_ns; /* monotonic */
-    uint64_t client;      /* whose share it uses; 0: nobody's */
+    uint64_t deadline_ns;                   /* monotonic */
+    uint64_t client;                        /* whose share it uses; 0: nobody's */
     bool (*is_gone)(struct waiter *waiter); /* the client has hung up; may be NULL */
     void (*finish)(struct waiter *waiter, const struct outcome *outcome);
 };

@@ -190,8 +190,8 @@ static void refresh_stale(struct service *s)
     for (int kind = 0; kind < STORE_KINDS; kind++) {
         struct store_entry entry;
         uint8_t after[PEN_ID_BYTES];
-        for (bool first = true;
-             scene_store_list(s->store, kind, first ? NULL : after, &entry, 1); first = false) {
+        for (bool first = true; scene_store_list(s->store, kind, first ? NULL : after, &entry, 1);
+             first = false) {
             memcpy(after, entry.id, PEN_ID_BYTES);
             if (!entry.stale)
                 continue;
@@ -309,8 +309,8 @@ struct service *service_create(
     pen_id_to_hex(digest, s->openapi_tag);
     if (!make_canary(s, error) || !(s->store = scene_store_open(config->store, error)))
         goto fail;
-    struct scheduler_limits limits = {(uint32_t)config->queue_limit,
-        (uint32_t)config->client_share, (uint32_t)config->workers};
+    struct scheduler_limits limits = {
+        (uint32_t)config->queue_limit, (uint32_t)config->client_share, (uint32_t)config->workers};
     s->metrics = metrics_create(catalogue);
     s->cache = result_cache_create(config->result_cache.bytes);
     s->scheduler = scheduler_create(&limits, on_work, s);

@@ -30,8 +30,8 @@ struct service {
     int canary_blob; /* a plane, as a blob in a memfd */
     uint8_t canary_id[PEN_ID_BYTES];
 
-    bool draining;    /* atomic */
-    uint32_t uploads; /* atomic: under way */
+    bool draining;                       /* atomic */
+    uint32_t uploads;                    /* atomic: under way */
     uint64_t bytes_received, bytes_sent; /* atomic, public listener */
 
     pthread_mutex_t canary_lock; /* guards the two below */

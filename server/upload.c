@@ -70,8 +70,8 @@ static bool begin_part(void *context, const char *name, struct pen_error *error)
     if (!is_safe_name(name))
         return pen_fail(error, PEN_UNPROCESSABLE, "", "A file of the upload has an invalid name.");
     if (u->part_count == PEN_BUNDLE_MAX_ENTRIES)
-        return pen_fail(error, PEN_TOO_LARGE, "", "An upload has at most %d files.",
-            PEN_BUNDLE_MAX_ENTRIES);
+        return pen_fail(
+            error, PEN_TOO_LARGE, "", "An upload has at most %d files.", PEN_BUNDLE_MAX_ENTRIES);
     if (u->part_count == u->part_capacity) {
         u->part_capacity = u->part_capacity * 2 + 16;
         u->parts = realloc(u->parts, u->part_capacity * sizeof *u->parts);
@@ -93,8 +93,8 @@ static bool add_data(void *context, const void *data, size_t bytes, struct pen_e
     return write_all(u->file, data, bytes, error);
 }
 
-struct upload *upload_create(struct scene_store *store, const char *content_type, uint64_t limit,
-    struct pen_error *error)
+struct upload *upload_create(
+    struct scene_store *store, const char *content_type, uint64_t limit, struct pen_error *error)
 {
     struct upload *u = calloc(1, sizeof *u);
     if (!u)
@@ -177,9 +177,9 @@ static bool put_part(struct upload *u, int to, const struct part *part, struct p
 static bool stands_alone(const char *name)
 {
     const char *dot = strrchr(name, '.');
-    return dot && (!strcasecmp(dot, ".glb") || !strcasecmp(dot, ".zip") ||
-                      !strcasecmp(dot, ".png") || !strcasecmp(dot, ".jpg") ||
-                      !strcasecmp(dot, ".jpeg") || !strcasecmp(dot, ".webp"));
+    return dot &&
+           (!strcasecmp(dot, ".glb") || !strcasecmp(dot, ".zip") || !strcasecmp(dot, ".png") ||
+               !strcasecmp(dot, ".jpg") || !strcasecmp(dot, ".jpeg") || !strcasecmp(dot, ".webp"));
 }
 
 /* Spool to source: the bundle's header and entries, or the only file. */
@@ -192,15 +192,14 @@ static bool write_bundle(struct upload *u, struct pen_error *error)
         if (!strcmp(u->parts[i - 1].name, u->parts[i].name))
             return pen_fail(
                 error, PEN_UNPROCESSABLE, "", "Two files of the upload have the same name.");
-    int to = openat(
-        u->staging.folder, STORE_SOURCE, O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
+    int to = openat(u->staging.folder, STORE_SOURCE, O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
     if (to < 0)
         return pen_fail(error, PEN_UNAVAILABLE, "", "The store could not be written.");
     u->hash = hash_create();
     bool alone = u->part_count == 1 && stands_alone(u->parts[0].name);
     uint32_t head[2] = {u->part_count, 0};
-    bool ok = alone || (put(u, to, PEN_BUNDLE_MAGIC, 8, error) &&
-                           put(u, to, head, sizeof head, error));
+    bool ok =
+        alone || (put(u, to, PEN_BUNDLE_MAGIC, 8, error) && put(u, to, head, sizeof head, error));
     for (uint32_t i = 0; ok && i < u->part_count; i++) {
         const struct part *part = &u->parts[i];
         uint32_t name_bytes[2] = {(uint32_t)strlen(part->name), 0};

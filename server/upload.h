@@ -7,8 +7,8 @@
 struct upload;
 /* `content_type` decides between a raw and a multipart body; `limit` is in bytes. Errors:
  * PEN_UNAVAILABLE (the store), PEN_UNSUPPORTED_MEDIA. */
-struct upload *upload_create(struct scene_store *store, const char *content_type, uint64_t limit,
-    struct pen_error *error);
+struct upload *upload_create(
+    struct scene_store *store, const char *content_type, uint64_t limit, struct pen_error *error);
 /* Removes what is left of it. */
 void upload_destroy(struct upload *upload);
 /* Errors: PEN_TOO_LARGE, PEN_BAD_REQUEST, PEN_UNAVAILABLE when the disk is full. */

@@ -39,23 +39,26 @@ static void warm_up(struct worker *worker)
     send_or_exit(&message);
 }
 
-/* Makes the scene and the emission images resident. */
-static bool load(struct worker *worker, const struct channel_job *job, const struct channel_fds *fds,
-    struct pen_result *result, struct pen_error *error)
+/* Makes the scene and the emission images resident, all at once. */
+static bool load(struct worker *worker, const struct channel_job *job,
+    const struct channel_fds *fds, struct pen_error *error)
 {
     struct pen_renderer *renderer = worker->renderer;
-    uint64_t start = clock_now_ns();
-    result->scene_was_resident = pen_renderer_has_scene(renderer, job->request.scene);
     bool ok = pen_renderer_load_scene(renderer, job->request.scene, fds->fd[0], error);
     for (uint32_t i = 0; ok && i < job->image_count; i++)
         ok = pen_renderer_load_image(renderer, job->images[i], fds->fd[1 + i], error);
-    result->stage_ms[PEN_STAGE_LOAD] = (float)clock_ms(clock_now_ns() - start);
-    return ok;
+    bool all = ok && pen_renderer_has_scene(renderer, job->request.scene);
+    for (uint32_t i = 0; all && i < job->image_count; i++)
+        all = pen_renderer_has_image(renderer, job->images[i]);
+    if (ok && !all)
+        pen_fail(error, PEN_TOO_LARGE, "",
+            "The scene and its emission images do not fit into GPU memory together.");
+    return all;
 }
 
 /* False when the context is lost: the job stays unanswered and the daemon gives it to another. */
-static bool run_job(struct worker *worker, const struct channel_message *message,
-    const struct channel_fds *fds)
+static bool run_job(
+    struct worker *worker, const struct channel_message *message, const struct channel_fds *fds)
 {
     const struct channel_job *job = &message->job_data;
     struct channel_message note = {CHANNEL_VERSION, CHANNEL_STARTED, message->job};
@@ -73,15 +76,20 @@ static bool run_job(struct worker *worker, const struct channel_message *message
     bool ok = fds->count == 1 + job->image_count && job->image_count <= PEN_MAX_LIGHTS;
     if (!ok)
         pen_fail(error, PEN_INTERNAL, "", "The worker was handed an incomplete job.");
-    ok = ok && pen_request_check(&job->request, pen_renderer_catalogue(), error) &&
-         load(worker, job, fds, result, error) &&
-         pen_renderer_render(worker->renderer, &job->request, &item->frame, result, error);
+    ok = ok && pen_request_check(&job->request, pen_renderer_catalogue(), error);
+    bool was_resident = ok && pen_renderer_has_scene(worker->renderer, job->request.scene);
+    uint64_t start = clock_now_ns();
+    ok = ok && load(worker, job, fds, error);
+    double load_ms = clock_ms(clock_now_ns() - start);
+    ok = ok && pen_renderer_render(worker->renderer, &job->request, &item->frame, result, error);
     if (!ok && pen_renderer_is_lost(worker->renderer)) {
         free(item);
         return false;
     }
     if (!ok && error->code == PEN_OK)
         pen_fail(error, PEN_INTERNAL, "", "The render failed without saying why.");
+    result->stage_ms[PEN_STAGE_LOAD] = (float)load_ms; /* after the render, which starts afresh */
+    result->scene_was_resident = was_resident;
     result->device = *pen_renderer_device(worker->renderer);
     result->gpu_bytes = pen_renderer_gpu_bytes(worker->renderer);
     note.kind = CHANNEL_RENDERED;

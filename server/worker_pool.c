@@ -15,9 +15,9 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#define IN_FLIGHT 2        /* one renders while the other is encoded */
-#define MAX_KILLS 2        /* of one render, by its own fault */
-#define MAX_ATTEMPTS 6     /* of one render, when somebody else ends the workers */
+#define IN_FLIGHT 2    /* one renders while the other is encoded */
+#define MAX_KILLS 2    /* of one render, by its own fault */
+#define MAX_ATTEMPTS 6 /* of one render, when somebody else ends the workers */
 #define QUIT_MS 3000
 #define MAX_BACKOFF_MS 5000
 #define MAX_DROPS 64
@@ -151,8 +151,8 @@ static void bury(struct slot *slot)
                    (WTERMSIG(status) == SIGKILL || WTERMSIG(status) == SIGTERM);
     bool any_rendering = false;
     for (int i = 0; i < IN_FLIGHT; i++)
-        any_rendering = any_rendering ||
-                        (slot->flights[i].render && slot->flights[i].phase == PHASE_RENDERING);
+        any_rendering =
+            any_rendering || (slot->flights[i].render && slot->flights[i].phase == PHASE_RENDERING);
     if (!is_stopping(pool)) {
         log_event(LOG_ERROR, "worker %u %s%s", slot->index, slot->hung ? "hung and " : "",
             process_describe(status, text, sizeof text));
@@ -220,8 +220,8 @@ static void on_warm(struct slot *slot, const struct channel_warm *warm)
     log_event(LOG_INFO, "worker %u warmed up in %.0f ms", slot->index, warm->warm_ms);
 }
 
-static void on_done(struct slot *slot, const struct channel_message *message,
-    const struct channel_fds *fds)
+static void on_done(
+    struct slot *slot, const struct channel_message *message, const struct channel_fds *fds)
 {
     struct worker_pool *pool = slot->pool;
     struct flight *flight = find_flight(slot, message->job);
@@ -249,8 +249,8 @@ static void on_done(struct slot *slot, const struct channel_message *message,
 }
 
 /* False when the worker is to be buried. */
-static bool on_message(struct slot *slot, const struct channel_message *message,
-    const struct channel_fds *fds)
+static bool on_message(
+    struct slot *slot, const struct channel_message *message, const struct channel_fds *fds)
 {
     struct flight *flight = find_flight(slot, message->job);
     switch (message->kind) {
@@ -384,8 +384,8 @@ static void *run(void *argument)
         uint64_t next = scheduler_expire(pool->config.scheduler);
         uint64_t now = clock_now_ns();
         if (!slot->process.pid) {
-            uint64_t backoff_ms = slot->failures ? 50ull << (slot->failures > 7 ? 7 : slot->failures)
-                                                 : 0;
+            uint64_t backoff_ms =
+                slot->failures ? 50ull << (slot->failures > 7 ? 7 : slot->failures) : 0;
             backoff_ms = backoff_ms > MAX_BACKOFF_MS ? MAX_BACKOFF_MS : backoff_ms;
             if (!slot->failures || now - slot->spawned_ns >= backoff_ms * CLOCK_MS)
                 spawn(slot);

@@ -13,8 +13,8 @@ struct worker_pool_config {
     struct scheduler *scheduler;
     /* Opens the blobs that a request needs: fds->fd[0] the scene's, then one per entry of
      * job->images. Called from the pool's threads. */
-    bool (*open_job)(void *context, struct channel_job *job, struct channel_fds *fds,
-        struct pen_error *error);
+    bool (*open_job)(
+        void *context, struct channel_job *job, struct channel_fds *fds, struct pen_error *error);
     /* A picture was made (before those who wait are answered). */
     void (*on_picture)(void *context, struct picture *picture);
     void *context;
@@ -35,8 +35,8 @@ uint32_t worker_pool_quarantine_s(struct worker_pool *pool, const uint8_t scene[
 struct worker_pool_numbers {
     bool has_device; /* a worker has said on what it renders */
     struct pen_device_info device;
-    bool warmed;  /* a worker has been through its warm-up */
-    uint32_t up;  /* workers that take jobs now */
+    bool warmed; /* a worker has been through its warm-up */
+    uint32_t up; /* workers that take jobs now */
     uint32_t restarts, crashes, hangs, retries, quarantined;
     uint64_t gpu_bytes;
     double create_ms, warm_ms; /* of the last worker that started */

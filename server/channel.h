@@ -8,6 +8,9 @@
 #define CHANNEL_WORKER_FD 3 /* the worker's end */
 #define CHANNEL_MAX_FDS (1 + PEN_MAX_LIGHTS)
 
+/* --warm-up N: when the worker compiles what common requests need. */
+enum worker_warm_up { WORKER_NO_WARM_UP, WORKER_WARM_UP_FIRST, WORKER_WARM_UP_IDLE };
+
 enum channel_kind {
     CHANNEL_HELLO = 1, /* worker: the context stands */
     CHANNEL_REFUSED,   /* worker: there is no such device; it then exits */

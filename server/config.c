@@ -41,6 +41,8 @@ static const struct row rows[] = {
         .help = "First GPU to use; further workers take the following ones."),
     ROW(require_gpu, "off", .help = "Refuse to render in software."),
     ROW(gl_debug, "off", .help = "Write OpenGL's debug messages to the log."),
+    ROW(warm_up, "on",
+        .help = "Compile what common requests need before the service says that it is ready."),
     ROW(gpu_memory, "1G", SIZE, .min = 1 << 20,
         .help = "Budget of each worker for scenes, images and shadow inputs."),
     ROW(workers, "1", .min = 1, .max = 16, .help = "Render processes: one per GPU."),

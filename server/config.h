@@ -26,7 +26,7 @@ struct config {
     config_flag insecure;
     config_choice device; /* enum pen_device_choice */
     uint64_t device_index;
-    config_flag require_gpu, gl_debug;
+    config_flag require_gpu, gl_debug, warm_up;
     config_size gpu_memory;
     uint64_t workers;
     uint64_t queue_limit, client_share;

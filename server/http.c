@@ -401,7 +401,7 @@ struct http_listener *http_listener_create(
         MHD_OPTION_NOTIFY_COMPLETED, on_completed, listener, MHD_OPTION_NOTIFY_CONNECTION,
         on_connection, listener, MHD_OPTION_CONNECTION_LIMIT, limit,
         MHD_OPTION_CONNECTION_MEMORY_LIMIT, (size_t)CONNECTION_MEMORY,
-        MHD_OPTION_CONNECTION_TIMEOUT, 0u, MHD_OPTION_STRICT_FOR_CLIENT, 1, MHD_OPTION_ARRAY,
+        MHD_OPTION_CONNECTION_TIMEOUT, 0u, MHD_OPTION_STRICT_FOR_CLIENT, -1, MHD_OPTION_ARRAY,
         config->threads > 1 ? pool_options : none, MHD_OPTION_ARRAY, tls ? tls_options : none,
         MHD_OPTION_END);
     if (!listener->daemon) {

@@ -11,7 +11,7 @@
 #include <string.h>
 #include <unistd.h>
 
-#define IDLE_BEFORE_WARM_UP_MS 250
+#define IDLE_BEFORE_WARM_UP_MS 10000 /* a replacement has work to catch up with first */
 #define EXIT_REFUSED 2
 #define EXIT_LOST 3
 #define EXIT_PROTOCOL 4
@@ -19,7 +19,7 @@
 struct worker {
     struct pen_renderer *renderer;
     struct worker_encoder *encoder;
-    bool warm;
+    enum worker_warm_up warm_up; /* what is still to be done */
 };
 
 static void send_or_exit(const struct channel_message *message)
@@ -35,7 +35,7 @@ static void warm_up(struct worker *worker)
     message.kind = CHANNEL_WARM;
     message.warm.warm_ms = (float)pen_renderer_warm_up(worker->renderer);
     message.warm.gpu_bytes = pen_renderer_gpu_bytes(worker->renderer);
-    worker->warm = true;
+    worker->warm_up = WORKER_NO_WARM_UP;
     send_or_exit(&message);
 }
 
@@ -105,7 +105,8 @@ static int serve(struct worker *worker)
     struct channel_fds fds;
     for (;;) {
         struct pollfd watch = {CHANNEL_WORKER_FD, POLLIN, 0};
-        int n = poll(&watch, 1, worker->warm ? -1 : IDLE_BEFORE_WARM_UP_MS);
+        int n =
+            poll(&watch, 1, worker->warm_up == WORKER_WARM_UP_IDLE ? IDLE_BEFORE_WARM_UP_MS : -1);
         if (n == 0) {
             warm_up(worker);
             continue;
@@ -131,7 +132,7 @@ static int serve(struct worker *worker)
 int main(int argc, char **argv)
 {
     struct pen_renderer_config config = {0};
-    bool warm_first = false;
+    struct worker worker = {0};
     for (int i = 1; i + 1 < argc; i += 2) {
         unsigned long long value = strtoull(argv[i + 1], NULL, 10);
         if (!strcmp(argv[i], "--device"))
@@ -144,10 +145,9 @@ int main(int argc, char **argv)
             config.debug = value != 0;
         else if (!strcmp(argv[i], "--gpu-memory"))
             config.gpu_memory_bytes = value;
-        else if (!strcmp(argv[i], "--warm-first"))
-            warm_first = value != 0;
+        else if (!strcmp(argv[i], "--warm-up"))
+            worker.warm_up = (enum worker_warm_up)value;
     }
-    struct worker worker = {0};
     static struct channel_message hello;
     struct pen_error error = {0};
     uint64_t start = clock_now_ns();
@@ -165,7 +165,7 @@ int main(int argc, char **argv)
     hello.hello.create_ms = (float)clock_ms(clock_now_ns() - start);
     hello.hello.device = *pen_renderer_device(worker.renderer);
     send_or_exit(&hello);
-    if (warm_first)
+    if (worker.warm_up == WORKER_WARM_UP_FIRST)
         warm_up(&worker);
     int status = serve(&worker);
     worker_encoder_destroy(worker.encoder);

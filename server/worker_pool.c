@@ -77,10 +77,12 @@ static void spawn(struct slot *slot)
     snprintf(gpu, sizeof gpu, "%d", renderer->require_gpu);
     snprintf(debug, sizeof debug, "%d", renderer->debug);
     snprintf(memory, sizeof memory, "%llu", (unsigned long long)renderer->gpu_memory_bytes);
-    snprintf(warm, sizeof warm, "%d", !slot->is_replacement);
+    enum worker_warm_up warm_up = !pool->config.warm_up  ? WORKER_NO_WARM_UP
+                                  : slot->is_replacement ? WORKER_WARM_UP_IDLE
+                                                         : WORKER_WARM_UP_FIRST;
+    snprintf(warm, sizeof warm, "%d", warm_up);
     char *arguments[] = {"penumbra-worker", "--device", device, "--device-index", index,
-        "--require-gpu", gpu, "--gl-debug", debug, "--gpu-memory", memory, "--warm-first", warm,
-        NULL};
+        "--require-gpu", gpu, "--gl-debug", debug, "--gpu-memory", memory, "--warm-up", warm, NULL};
     struct process_fd fd = {pair[1], CHANNEL_WORKER_FD};
     struct pen_error error = {0};
     if (process_start(&slot->process, pool->config.worker_path, arguments, &fd, 1, &error)) {
@@ -192,6 +194,7 @@ static void on_hello(struct slot *slot, const struct channel_hello *hello)
     pthread_mutex_lock(&pool->lock);
     struct worker_pool_numbers *numbers = &pool->numbers;
     numbers->has_device = true;
+    numbers->warmed = numbers->warmed || !pool->config.warm_up;
     numbers->device = hello->device;
     numbers->device.renderer[sizeof numbers->device.renderer - 1] = 0;
     numbers->device.version[sizeof numbers->device.version - 1] = 0;

@@ -44,6 +44,8 @@ class Daemon:
             self.start()
 
     def start(self):
+        if self.process:
+            self.process.stdout.close()
         self.log_path = os.path.join(self.folder, "log-%f" % time.time())
         flags = {"--listen": "127.0.0.1:0", "--admin-listen": "127.0.0.1:0", "--store": self.store,
                  "--warm-up": "off"}
@@ -215,7 +217,7 @@ def grid_scene(n=1, name="grid"):
 
 SMALL = {"technique": {"name": "hard"}, "width": 64, "height": 48}
 # Takes a worker a good while: for tests that need one under way.
-HEAVY = {"technique": {"name": "multisample", "params": {"samples": 256}}, "width": 800, "height": 600}
+HEAVY = {"technique": {"name": "multisample", "params": {"samples": 64}}, "width": 800, "height": 600}
 
 
 def main():

@@ -51,6 +51,8 @@ int main(void)
         free(run.blob);
         count++;
     }
+    if (folder)
+        closedir(folder);
     printf("%d files; slowest %.2f s, largest %ld MB\n", count, slowest, largest);
     CHECK(count > 150);
     CHECK_DONE();

@@ -3,6 +3,7 @@
 #include "renderer/passes/passes.h"
 #include <cglm/cglm.h>
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 /* As ViewBlock in view.glsl. */
@@ -95,6 +96,7 @@ static void upload_view(struct frame *f, uint32_t number)
     memcpy(b.eye, v->eye, 12);
     b.eye[3] = 0.5f * (float)r->height / tanf(0.5f * v->fov_y_rad);
     memcpy(b.forward, v->forward, 12);
+    b.forward[3] = v->near_z;
     b.viewport[0] = (float)r->width, b.viewport[1] = (float)r->height;
     b.viewport[2] = 1 / b.viewport[0], b.viewport[3] = 1 / b.viewport[1];
     memcpy(b.ambient, r->ambient, 12);
@@ -105,7 +107,7 @@ static void upload_view(struct frame *f, uint32_t number)
     bool empty = scene_is_empty(f->job->scene);
     b.ground[0] = center[0], b.ground[2] = center[2];
     /* A hair below the bounds, so that a floor of the scene itself hides it. */
-    b.ground[1] = (empty ? 0 : f->job->scene->blob.header->bounds_min[1]) - 2e-3f * radius;
+    b.ground[1] = (empty ? 0 : f->job->scene->blob.header->bounds_min[1]) - 1e-4f * radius;
     b.ground[3] = 12 * radius;
     b.display[0] = exp2f(r->exposure_ev);
     b.display[1] = (float)r->tone_map;
@@ -208,12 +210,21 @@ static bool shade(struct frame *f, struct pen_error *error)
         {UNIT_SURFACE, t->gbuffer.surface.name, GL_SAMPLE_NEAREST},
         {UNIT_FREE, t->vis.name, GL_SAMPLE_NEAREST},
         {UNIT_EMITTED, t->gbuffer.emission.name, GL_SAMPLE_NEAREST}};
-    static const char *const variants[] = {
-        NULL, "#define EMIT\n", "#define RESOLVE\n", "#define RESOLVE\n#define EMIT\n"};
+    bool rect = false, round = false, punctual = false;
+    for (uint32_t i = 0; i < f->light_count; i++) {
+        uint32_t type = f->lights[i].source->type;
+        rect |= type == PEN_LIGHT_RECT;
+        round |= type == PEN_LIGHT_DISK || type == PEN_LIGHT_SPHERE;
+        punctual |= type >= PEN_LIGHT_SUN;
+    }
+    char defines[160];
+    snprintf(defines, sizeof defines, "%s%s%s%s%s", direct ? "#define RESOLVE\n" : "",
+        emission ? "#define EMIT\n" : "", rect ? "#define HAS_RECT\n" : "",
+        round ? "#define HAS_ROUND\n" : "", punctual ? "#define HAS_PUNCTUAL\n" : "");
     return pass_fill(job->ctx,
         &(struct pass_fill){.name = "shade",
             .fragment = "shade.frag",
-            .defines = variants[2 * direct + emission],
+            .defines = defines,
             .stage = PEN_STAGE_SHADE,
             .textures = textures,
             .texture_count = emission ? 6 : 5,

@@ -59,6 +59,7 @@ struct pen_renderer *pen_renderer_create(
         return NULL;
     }
     r->budget = config->gpu_memory_bytes ? config->gpu_memory_bytes : 1ull << 30;
+    r->ctx.shadow_budget = r->budget / 2;
     r->ctx.programs = gl_programs_create();
     r->ctx.shadows = shadow_cache_create();
     gl_samplers_init(&r->ctx.samplers);
@@ -99,6 +100,11 @@ void pen_renderer_destroy(struct pen_renderer *r)
     gl_samplers_finish(&r->ctx.samplers);
     gl_programs_destroy(r->ctx.programs);
     gl_texture_destroy(&r->ctx.white);
+    gl_texture_destroy(&r->ctx.interleaved);
+    gl_texture_destroy(&r->ctx.sample_scratch);
+    gl_texture_destroy(&r->ctx.sum);
+    gl.DeleteFramebuffers(1, &r->ctx.sum_framebuffer);
+    gl.DeleteFramebuffers(1, &r->ctx.interleaved_framebuffer);
     GLuint buffers[] = {r->ctx.light_block, r->ctx.param_block};
     gl.DeleteBuffers(2, buffers);
     gl.DeleteVertexArrays(1, &r->ctx.empty_array);

@@ -107,7 +107,7 @@ static void append_params(struct text *t, const struct pen_technique_info *info,
         append(t, "layout(std140, binding = 2) uniform ParamBlock {\n");
         static const char *const types[] = {"float", "int", "uint", "uint"};
         for (uint32_t i = 0; i < info->params.count; i++)
-            appendf(t, "    %s %s;\n", types[info->params.rows[i].type], info->params.rows[i].name);
+            appendf(t, "    %s p_%s;\n", types[info->params.rows[i].type], info->params.rows[i].name);
         append(t, "} param_block;\n");
     }
     for (uint32_t i = 0; i < info->params.count; i++) {
@@ -120,9 +120,9 @@ static void append_params(struct text *t, const struct pen_technique_info *info,
         else if (row->specialise)
             appendf(t, "#define P_%s %.0f\n", row->name, pen_param_load(row, params, 0));
         else if (row->type == PEN_PARAM_FLAG)
-            appendf(t, "#define P_%s (param_block.%s != 0u)\n", row->name, row->name);
+            appendf(t, "#define P_%s (param_block.p_%s != 0u)\n", row->name, row->name);
         else
-            appendf(t, "#define P_%s param_block.%s\n", row->name, row->name);
+            appendf(t, "#define P_%s param_block.p_%s\n", row->name, row->name);
         if (row->choices)
             for (uint32_t k = 0; row->choices[k]; k++) {
                 char constant[96];
@@ -146,12 +146,15 @@ static bool assemble(
     return expand(&e, file, error);
 }
 
-static void print_numbered(const char *text)
+/* The lines around the first one that the compiler's log names, as "0:LINE(". */
+static void print_around(const char *text, const char *log)
 {
-    int number = 1;
-    for (const char *line = text; *line;) {
+    const char *colon = strchr(log, ':');
+    int wanted = colon ? atoi(colon + 1) : 0, number = 1;
+    for (const char *line = text; *line; number++) {
         const char *end = strchrnul(line, '\n');
-        fprintf(stderr, "%4d %.*s\n", number++, (int)(end - line), line);
+        if (abs(number - wanted) <= 3)
+            fprintf(stderr, "%4d %.*s\n", number, (int)(end - line), line);
         line = *end ? end + 1 : end;
     }
 }
@@ -167,7 +170,7 @@ static GLuint compile(GLenum stage, const char *text, const char *file, struct p
         return shader;
     char log[4096];
     gl.GetShaderInfoLog(shader, sizeof log, NULL, log);
-    print_numbered(text);
+    print_around(text, log);
     fprintf(stderr, "%s: %s\n", file, log);
     gl.DeleteShader(shader);
     pen_fail(error, PEN_INTERNAL, "", "The shader %s does not compile on this device.", file);

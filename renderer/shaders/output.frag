@@ -37,11 +37,11 @@ void main()
 #elif LAYER == 2
     // Penumbra class from the mean visibility: lit 0, penumbra 1, umbra 2.
     float v = texelFetch(accumulated, pixel, 0).a;
-    float class = v >= 0.999 ? 0.0 : v <= 0.001 ? 2.0 : 1.0;
+    float kind = v >= 0.999 ? 0.0 : v <= 0.001 ? 2.0 : 1.0;
 #ifdef RAW
-    color = vec4(class, class, class, 1.0);
+    color = vec4(vec3(kind), 1.0);
 #else
-    color = vec4(vec3(0.5 * class), 1.0);
+    color = vec4(vec3(0.5 * kind), 1.0);
 #endif
 #elif LAYER == 3
 #ifdef RAW

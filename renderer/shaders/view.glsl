@@ -3,7 +3,7 @@ layout(std140, binding = 0) uniform ViewBlock {
     mat4 world_to_clip;
     mat4 clip_to_world;
     vec4 eye;          // xyz, m; w: pixels per unit of tangent, H / (2 tan(fov_y / 2))
-    vec4 forward;      // unit
+    vec4 forward;      // unit; w: near plane, so that a pixel's view distance is forward.w / depth
     vec4 viewport;     // width, height, 1 / width, 1 / height
     vec4 ambient;      // radiance
     vec4 background;   // radiance

@@ -136,7 +136,7 @@ static void tangents_of_mirrored_strip(void)
     free(data);
 }
 
-/* On a sphere with u = longitude the tangent is the direction of growing longitude. */
+/* u is the longitude, so that the tangent is the direction of growing longitude. */
 static void torus(uint32_t rings, uint32_t sides, double tube, float (*positions)[3],
     float (*normals)[3], float (*uv)[2], uint32_t *indices)
 {
@@ -258,6 +258,61 @@ static void meshlet_cones(void)
     fprintf(stderr, "cones found %u of %u meshlets that face away\n", culled, away);
 }
 
+/* Seen from afar the cone alone decides: directions right at its limit, and random ones. A patch of
+ * a torus has normals in a wide fan, so a cutoff that is a little too low fails here. */
+static void meshlet_cones_from_afar(void)
+{
+    uint64_t state = 11;
+    struct psc_mesh mesh = torus_mesh(0.5);
+    uint32_t meshlets[CORNERS / 3 / 16];
+    for (uint32_t i = 0; i < CORNERS / 3 / 16; i++)
+        meshlets[i] = 16;
+    mesh.meshlet_triangles = meshlets;
+    mesh.meshlet_count = CORNERS / 3 / 16;
+    struct psc_scene s;
+    void *data = build_one(&mesh, &s);
+    uint32_t culled = 0, kept = 0;
+    for (uint32_t m = 0; m < s.meshlet_count; m++) {
+        const struct psc_meshlet *let = &s.meshlets[m];
+        for (int e = 0; e < 200 && let->cone_cutoff < 1; e++) {
+            double v[3], length = 0, along = 0, dot = 0, worst = 1;
+            for (int k = 0; k < 3; k++) {
+                v[k] = uniform(&state, -1, 1);
+                along += v[k] * let->cone_axis[k];
+            }
+            /* The part across the axis, with the part along it replaced by the limit's. */
+            for (int k = 0; k < 3; k++) {
+                v[k] -= along * let->cone_axis[k];
+                length += v[k] * v[k];
+            }
+            double c = let->cone_cutoff * (e % 2 ? 1.0001 : 0.95);
+            for (int k = 0; k < 3; k++) {
+                v[k] = v[k] / sqrt(length) * sqrt(1 - c * c) + c * let->cone_axis[k];
+                dot += v[k] * let->cone_axis[k];
+            }
+            for (uint32_t i = 0; i < let->index_count; i += 3) {
+                const uint32_t *t = &s.indices[let->first_index + i];
+                double e1[3], e2[3], n[3];
+                for (int k = 0; k < 3; k++) {
+                    e1[k] = (double)s.positions[t[1]][k] - s.positions[t[0]][k];
+                    e2[k] = (double)s.positions[t[2]][k] - s.positions[t[0]][k];
+                }
+                cross(e1, e2, n);
+                double size = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+                worst = fmin(worst, (n[0] * v[0] + n[1] * v[1] + n[2] * v[2]) / size);
+            }
+            if (dot >= let->cone_cutoff) {
+                CHECK(worst >= 0);
+                culled++;
+            } else {
+                kept += worst < 0;
+            }
+        }
+    }
+    CHECK(culled > 1000 && kept > 100); /* the limit is reached, and it is not far too strict */
+    free(data);
+}
+
 int main(void)
 {
     flat_normals_of_a_cube();
@@ -265,5 +320,6 @@ int main(void)
     tangents_of_mirrored_strip();
     tangents_of_a_torus();
     meshlet_cones();
+    meshlet_cones_from_afar();
     CHECK_DONE();
 }

@@ -13,5 +13,5 @@ if(PENUMBRA_DAEMON)
         COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/encode/check_files.py $<TARGET_FILE:encode_sample>)
     set_tests_properties(unit.encode_files PROPERTIES LABELS unit TIMEOUT 120)
     set_tests_properties(unit.encode_formats unit.encode_files PROPERTIES
-        ENVIRONMENT "TSAN_OPTIONS=suppressions=${CMAKE_CURRENT_SOURCE_DIR}/encode/tsan.supp")
+        ENVIRONMENT "TSAN_OPTIONS=suppressions=${CMAKE_SOURCE_DIR}/tests/tsan.supp")
 endif()

@@ -1,0 +1,9 @@
+/* A render request from command-line flags. */
+#pragma once
+#include "clients/cli/cli.h"
+
+/* Consumes one flag that shapes the request: --technique, --set, --light, --json and one per
+ * parameter row. `root` is the request body so far. */
+bool cli_request_option(struct cli_args *args, cJSON *root);
+/* True when the body has `key`, at the top or inside the object `group`. */
+bool cli_request_has(const cJSON *root, const char *group, const char *key);

@@ -1,0 +1,27 @@
+#include "renderer/passes/interleave.h"
+#include <stdio.h>
+
+bool pass_interleaved(
+    struct technique_run *run, const struct pass_screen *pass, struct pen_error *error)
+{
+    struct technique_ctx *ctx = run->ctx;
+    char defines[512];
+    snprintf(defines, sizeof defines, "#define INTERLEAVED\n%s", pass->defines ? pass->defines : "");
+    if (gl_texture_fit(&ctx->interleaved, GL_RG16F, run->width, run->height, 0, 1) ||
+        !ctx->interleaved_framebuffer) {
+        gl.DeleteFramebuffers(1, &ctx->interleaved_framebuffer);
+        const struct gl_texture *color = &ctx->interleaved;
+        ctx->interleaved_framebuffer = gl_framebuffer_create(&color, 1, NULL);
+    }
+    static const float lit[4] = {1, 0, 0, 1};
+    gl.ClearNamedFramebufferfv(ctx->interleaved_framebuffer, GL_COLOR, 0, lit);
+    struct pass_screen first = *pass;
+    first.defines = defines;
+    first.framebuffer = ctx->interleaved_framebuffer;
+    struct pass_texture source = {UNIT_FREE, ctx->interleaved.name, GL_SAMPLE_NEAREST};
+    struct pass_screen second = {.name = "interleave",
+        .body = "interleave.glsl",
+        .textures = &source,
+        .texture_count = 1};
+    return pass_screen(run, &first, error) && pass_screen(run, &second, error);
+}

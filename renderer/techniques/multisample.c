@@ -1,0 +1,105 @@
+#include "renderer/passes/passes.h"
+#include "renderer/passes/sample_maps.h"
+#include "renderer/techniques/map_params.h"
+#include <string.h>
+
+#define MAX_SAMPLES 1024
+
+static const char *const weighting_names[] = {"area", "g", NULL};
+
+struct multisample {
+    uint32_t samples;
+    uint32_t map_size;
+    uint32_t weighting;
+    float bias;
+};
+
+static const struct pen_param rows[] = {
+    PARAM(struct multisample, samples, .def = 256, .min = 1, .max = MAX_SAMPLES,
+        .help = "Points on the light, each with a shadow map of its own."),
+    MAP_SIZE_ROW(struct multisample, 1024),
+    PARAM(struct multisample, weighting, .choices = weighting_names, .specialise = 1,
+        .help = "Mean over the light's area, or weighted by each point's irradiance."),
+    BIAS_ROW(struct multisample),
+};
+
+static void fit_sum(struct technique_run *run)
+{
+    static const float zero[4] = {0};
+    struct technique_ctx *ctx = run->ctx;
+    if (gl_texture_fit(&ctx->sum, GL_RGBA32F, run->width, run->height, 0, 1) ||
+        !ctx->sum_framebuffer) {
+        gl.DeleteFramebuffers(1, &ctx->sum_framebuffer);
+        const struct gl_texture *color = &ctx->sum;
+        ctx->sum_framebuffer = gl_framebuffer_create(&color, 1, NULL);
+    }
+    gl.ClearNamedFramebufferfv(ctx->sum_framebuffer, GL_COLOR, 0, zero);
+}
+
+struct lookup_block {
+    struct sample_map samples[SAMPLE_MAP_BATCH];
+    int32_t count[4];
+    float weight[4]; /* x: 1 / samples */
+};
+
+static bool add_batch(struct technique_run *run, const struct sample_point *points, uint32_t first,
+    uint32_t count, bool keep, struct pen_error *error)
+{
+    const struct multisample *params = run->params;
+    struct lookup_block block = {.count = {(int32_t)count},
+        .weight = {1.0f / (float)params->samples}};
+    const struct gl_texture *maps;
+    if (!pass_sample_maps(run, points + first, count, params->map_size, first, keep, block.samples,
+            &maps, error))
+        return false;
+    struct pass_texture texture = {UNIT_FREE, maps->name, GL_SAMPLE_NEAREST_BORDER};
+    return pass_screen(run,
+        &(struct pass_screen){.name = "multisample lookup",
+            .body = "multisample.glsl",
+            .textures = &texture,
+            .texture_count = 1,
+            .framebuffer = run->ctx->sum_framebuffer,
+            .add = true,
+            .extra = &block,
+            .extra_bytes = sizeof block},
+        error);
+}
+
+static bool record(struct technique_run *run, struct pen_error *error)
+{
+    const struct multisample *params = run->params;
+    struct sample_point points[MAX_SAMPLES];
+    sample_points(run->face, params->samples, points);
+    uint64_t bytes = (uint64_t)params->samples * params->map_size * params->map_size * 4;
+    bool keep = bytes <= run->ctx->shadow_budget;
+    fit_sum(run);
+    for (uint32_t first = 0; first < params->samples; first += SAMPLE_MAP_BATCH) {
+        uint32_t left = params->samples - first;
+        uint32_t n = left < SAMPLE_MAP_BATCH ? left : SAMPLE_MAP_BATCH;
+        if (!add_batch(run, points, first, n, keep, error))
+            return false;
+    }
+    
+    struct pass_texture sum = {UNIT_FREE, run->ctx->sum.name, GL_SAMPLE_NEAREST};
+    return pass_screen(run,
+        &(struct pass_screen){.name = "multisample resolve",
+            .body = "multisample_resolve.glsl",
+            .textures = &sum,
+            .texture_count = 1},
+        error);
+}
+
+const struct technique technique_multisample = {
+    .info = {.name = "multisample",
+        .title = "Multi-sampled area light",
+        .summary = "Averages hard shadows from many points of the light, each with an off-axis "
+                   "shadow map; converges to the true visibility.",
+        .citation = "P. Heckbert, M. Herf, Simulating soft shadows with graphics hardware, "
+                    "CMU-CS-97-104, 1997",
+        .artefacts = "Bands at few samples; texels of each map; cost grows with the samples.",
+        .cost_class = PEN_COST_REFERENCE,
+        .textured = true,
+        .struct_size = sizeof(struct multisample),
+        .params = {rows, sizeof rows / sizeof *rows}},
+    .record = record,
+};

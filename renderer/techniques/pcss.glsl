@@ -1,0 +1,47 @@
+// Fernando 2005 with exact projections (F3, F4 of the light frame) and the receiver's plane.
+#include "taps.glsl"
+#include "min_max.glsl"
+
+vec4 visibility(Surface s)
+{
+    vec2 q = light_project(s.p), texel = light_texel(shadow_map);
+    vec2 inverse_size = 1.0 / (light.rect.zw - light.rect.xy), uv = light_uv(q);
+    ReceiverPlane plane = receiver_plane(s.p, s.n);
+    float bias = P(bias) * s.p.z * light_depth_slope(s.p.z);
+    vec2 shift = P(smooth) ? frame_shift(s.pixel) : vec2(0.5);
+
+    float nearest_z;
+    vec2 search = min_max_search_extent(q, s.p.z, texel, nearest_z);
+    int search_count = nearest_z < s.p.z ? P(search_taps) : 0;
+    Taps taps = taps_begin(P(search_taps), shift);
+    float sum = 0.0, blockers = 0.0;
+    for (int i = 0; i < search_count; i++) {
+        vec2 offset = taps_next(taps) * search;
+        float d = texture(shadow_map, uv + offset * inverse_size).r;
+        if (d < plane_depth(plane, offset, bias)) {
+            sum += light_linear(d);
+            blockers += 1.0;
+        }
+    }
+    // The loop below runs zero times where nothing blocks: a dynamic bound skips it, a return
+    // would not (software rasterisers run all lanes to the end).
+    float caster_z = min(sum / max(blockers, 1.0), s.p.z);
+    vec2 extent = max(light_filter_extent(caster_z, s.p.z), P(min_filter) * texel);
+    int count = blockers > 0.0 ? P(filter_taps) : 0;
+    taps = taps_begin(P(filter_taps), shift);
+    float lit = 0.0;
+    for (int i = 0; i < count; i++) {
+        vec2 offset = taps_next(taps) * extent;
+        float d = texture(shadow_map, uv + offset * inverse_size).r;
+        lit += plane_depth(plane, offset, bias) <= d ? 1.0 : 0.0;
+    }
+    float v = count > 0 ? lit / float(count) : 1.0;
+#ifdef INTERLEAVED
+    // Width of the penumbra on the screen, F5, for the averaging pass.
+    float scale = light.parallel != 0 ? 1.0 : s.p.z / light.near_z;
+    float pixels = 2.0 * extent.x * scale * view.eye.w * s.depth / view.forward.w;
+    return vec4(v, count > 0 ? pixels : 0.0, 0.0, 1.0);
+#else
+    return scalar_visibility(v);
+#endif
+}

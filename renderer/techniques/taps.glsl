@@ -1,0 +1,53 @@
+// Sampling patterns of kernels over the emitter's shape, points in [-1, 1]^2. A pattern is walked by
+// adding a constant, so that a tap costs no trigonometry.
+//
+// Rectangle: the R2 sequence (Roberts 2018). Disk: Vogel's spiral (1979), equal area per tap.
+struct Taps {
+    vec2 at;        // R2 state in [0, 1)^2, or unit direction of the spiral
+    float index, inverse_count;
+};
+
+// `shift` in [0, 1)^2 moves the whole pattern (Cranley and Patterson 1976).
+Taps taps_begin(int count, vec2 shift)
+{
+    Taps t;
+    t.index = shift.y;
+    t.inverse_count = 1.0 / float(count);
+    if (light.shape == SHAPE_DISK) {
+        float angle = 6.2831853 * shift.x;
+        t.at = vec2(cos(angle), sin(angle));
+    } else {
+        t.at = shift;
+    }
+    return t;
+}
+
+vec2 taps_next(inout Taps t)
+{
+    vec2 p;
+    if (light.shape == SHAPE_DISK) {
+        p = t.at * sqrt(t.index * t.inverse_count);
+        t.at = mat2(-0.73736888, 0.67549029, -0.67549029, -0.73736888) * t.at; // golden angle
+    } else {
+        p = 2.0 * t.at - 1.0;
+        t.at = fract(t.at + vec2(0.75487767, 0.56984029));
+    }
+    t.index += 1.0;
+    return p;
+}
+
+// One of 16 shifts, a different one for each pixel of every 4 x 4 block (Keller and Heidrich 2001).
+// The spiral also takes y as its first index, so it stays in (0, 1).
+vec2 interleaved_shift(ivec2 pixel)
+{
+    int k = (pixel.x & 3) | (pixel.y & 3) << 2;
+    // A 4 x 4 ordered-dither order, so that neighbours differ most.
+    int order = (k & 1) << 3 ^ (k & 4) << 1 | ((k >> 2 & 1) << 2) | (k & 2) ^ (k >> 2 & 2) | (k >> 3 & 1);
+    return fract(vec2(0.75487767, 0.56984029) * float(order) + 0.5 / 16.0);
+}
+
+// Frame number folded in, so that jittered frames average different patterns.
+vec2 frame_shift(ivec2 pixel)
+{
+    return fract(interleaved_shift(pixel) + view.display.z * vec2(0.38196601, 0.27639320));
+}

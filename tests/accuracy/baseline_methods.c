@@ -1,0 +1,90 @@
+/* T1, T2 and T3 for the first methods, against their closed forms. */
+#include "tests/accuracy/harness.h"
+#include "tests/unit/check.h"
+
+static struct deviation deviation(uint32_t kind, float height, const char *settings,
+    truth_function truth, const struct planar_case *t)
+{
+    uint8_t id[PEN_ID_BYTES];
+    struct pen_generated_options options = {.kind = kind, .caster_height = height};
+    harness_scene(&options, id);
+    struct shot shot;
+    harness_shot(id, settings, &shot);
+    struct deviation d = harness_deviation(&shot, truth, t);
+    harness_shot_finish(&shot);
+    fprintf(stderr, "%-60.60s rmse %.5f penumbra %.5f worst %.4f mean %+.5f\n", settings, d.rmse,
+        d.rmse_penumbra, d.worst, d.mean);
+    return d;
+}
+
+static void check_hard(void)
+{
+    /* The edge lies within a texel of x = 0, so only a few pixel columns may differ from a step. */
+    struct planar_case t = {.c = 1.2, .h = 3, .a = 1e-9};
+    struct deviation d = deviation(PEN_GENERATED_HALF_PLANE, 1.2f,
+        "technique=hard&map_size=4096&" HARNESS_VIEW HARNESS_RECT, truth_half_plane, &t);
+    CHECK(d.rmse < sqrt(2.0 / 256));
+}
+
+static void check_pcss(void)
+{
+    static const float heights[] = {2.1f, 1.5f, 1.2f}; /* c_z / r_z = 0.3, 0.5, 0.6 */
+    for (int i = 0; i < 3; i++) {
+        double c = heights[i], h = 3, a = 0.25;
+        struct planar_case t = {.c = c, .h = h, .a = a};
+        uint8_t id[PEN_ID_BYTES];
+        struct pen_generated_options options = {
+            .kind = PEN_GENERATED_HALF_PLANE, .caster_height = heights[i]};
+        harness_scene(&options, id);
+        struct shot shot;
+        harness_shot(id,
+            "technique=pcss&map_size=4096&search_taps=64&filter_taps=64&" HARNESS_VIEW
+            "&light.type=rect&light.position=0,3,0&light.target=0,0,0&light.up=0,0,-1"
+            "&light.width=0.5&light.height=0.5",
+            &shot);
+        double expected = 0.8 * 2 * a * c / (h - c), width = harness_width_10_90(&shot);
+        fprintf(stderr, "pcss caster at %.1f: 10-90 %% width %.4f, expected %.4f\n", c, width, expected);
+        CHECK_NEAR(width, expected, 0.05 * expected);
+        CHECK(harness_deviation(&shot, truth_half_plane, &t).rmse < 0.02);
+        harness_shot_finish(&shot);
+    }
+    struct planar_case disk = {.c = 1.2, .h = 3, .a = 0.5};
+    CHECK(deviation(PEN_GENERATED_HALF_PLANE, 1.2f,
+              "technique=pcss&map_size=4096&search_taps=64&filter_taps=64&" HARNESS_VIEW HARNESS_DISK,
+              truth_half_plane_disk, &disk)
+              .rmse < 0.02);
+}
+
+static void check_multisample(void)
+{
+    struct planar_case t = {.c = 1.2, .h = 3, .a = 0.5, .s = 0.4};
+    static const uint32_t counts[] = {16, 64, 256};
+    /* RMSE of V for axis-aligned edges with Hammersley points, techniques 2.5, plus what the
+     * texels of a 2048 map add. */
+    static const double limits[] = {0.018, 0.0045, 0.0011};
+    double last = 1;
+    for (int i = 0; i < 3; i++) {
+        char settings[512];
+        snprintf(settings, sizeof settings,
+            "technique=multisample&samples=%u&map_size=2048&" HARNESS_VIEW HARNESS_RECT, counts[i]);
+        double rmse = deviation(PEN_GENERATED_HALF_PLANE, 1.2f, settings, truth_half_plane, &t).rmse_penumbra;
+        CHECK(rmse < limits[i] + 0.002);
+        CHECK(rmse < 0.5 * last);
+        last = rmse;
+    }
+    struct deviation square = deviation(PEN_GENERATED_SQUARE, 1.2f,
+        "technique=multisample&samples=256&map_size=2048&" HARNESS_VIEW HARNESS_RECT, truth_square, &t);
+    CHECK(square.rmse < 0.005);
+    struct deviation disk = deviation(PEN_GENERATED_HALF_PLANE, 1.2f,
+        "technique=multisample&samples=256&map_size=2048&" HARNESS_VIEW HARNESS_DISK,
+        truth_half_plane_disk, &t);
+    CHECK(disk.rmse < 0.005);
+}
+
+int main(void)
+{
+    check_hard();
+    check_pcss();
+    check_multisample();
+    CHECK_DONE();
+}

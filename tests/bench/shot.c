@@ -1,0 +1,91 @@
+/* penumbra-shot SCENE.pscene OUT.png [key=value ...]: one image without a daemon. Keys are those of
+ * the GET render call; repeat=N renders N times and prints the last one's times; a scene name of
+ * penumbra generate (square, demo, ...) instead of a file makes that scene. */
+#include "protocol/json_request.h"
+#include "renderer/blob/pscene.h"
+#include "renderer/encode/encode.h"
+#include "renderer/generate/generate.h"
+#include <fcntl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+static int open_scene(const char *name, struct pen_error *error)
+{
+    for (uint32_t i = 0; pen_generated_names[i]; i++) {
+        if (strcmp(pen_generated_names[i], name))
+            continue;
+        struct pen_generated_options options = {.kind = i};
+        void *data;
+        size_t bytes;
+        if (!pen_generate_blob(&options, &data, &bytes, error))
+            return -1;
+        int fd = memfd_create("scene", 0);
+        if (write(fd, data, bytes) != (ssize_t)bytes)
+            exit(1);
+        free(data);
+        return fd;
+    }
+    return open(name, O_RDONLY);
+}
+
+static int report(const struct pen_error *error)
+{
+    fprintf(stderr, "%u %s %s\n", error->code, error->message, error->pointer);
+    return 1;
+}
+
+int main(int argc, char **argv)
+{
+    if (argc < 3) {
+        fprintf(stderr, "usage: %s SCENE OUT [key=value ...]\n", argv[0]);
+        return 2;
+    }
+    struct pen_error error = {0};
+    struct pen_query_pair pairs[64];
+    uint32_t count = 0;
+    int repeat = 1;
+    for (int i = 3; i < argc && count < 64; i++) {
+        char *equals = strchr(argv[i], '=');
+        if (!equals)
+            return 2;
+        *equals = 0;
+        if (!strcmp(argv[i], "repeat"))
+            repeat = atoi(equals + 1);
+        else
+            pairs[count++] = (struct pen_query_pair){argv[i], equals + 1};
+    }
+    struct pen_request request;
+    if (!pen_request_from_query(pairs, count, pen_renderer_catalogue(), &request, &error))
+        return report(&error);
+    struct pen_renderer_config config = {.debug = true};
+    struct pen_renderer *renderer = pen_renderer_create(&config, &error);
+    if (!renderer)
+        return report(&error);
+    int fd = open_scene(argv[1], &error);
+    if (fd < 0 || !pen_renderer_load_scene(renderer, request.scene, fd, &error))
+        return report(&error);
+    static struct pen_result result;
+    struct pen_frame frame = {0};
+    struct pen_bytes bytes = {0};
+    for (int i = 0; i < repeat; i++) {
+        pen_frame_finish(&frame);
+        if (!pen_renderer_render(renderer, &request, &frame, &result, &error))
+            return report(&error);
+    }
+    for (uint32_t i = 0; i < result.pass_count; i++)
+        printf("%-10s %-22s x%-3u %8.2f ms\n", pen_stage_names[result.passes[i].stage],
+            result.passes[i].name, result.passes[i].count, (double)result.passes[i].ms);
+    for (uint32_t i = 0; i < result.warning_count; i++)
+        printf("warning: %s\n", result.warnings[i]);
+    if (!pen_encode(&frame, &request.output, NULL, 0, &bytes, &error))
+        return report(&error);
+    FILE *file = fopen(argv[2], "wb");
+    bool ok = file && fwrite(bytes.data, 1, bytes.size, file) == bytes.size && !fclose(file);
+    pen_bytes_finish(&bytes);
+    pen_frame_finish(&frame);
+    pen_renderer_destroy(renderer);
+    return ok ? 0 : 1;
+}

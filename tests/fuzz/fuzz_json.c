@@ -1,0 +1,63 @@
+/* Any bytes as a request body, or (first byte 'q') as lines "key=value" of a query. What is
+ * accepted must print to a body that reads back as the same request; what is refused must say why.
+ */
+#include "protocol/json_request.h"
+#include "protocol/json_result.h"
+#include "protocol/json_scan.h"
+#include "tests/unit/documents_catalogue.h"
+#include <stdlib.h>
+#include <string.h>
+
+#define REQUIRE(condition)                                                                         \
+    do {                                                                                           \
+        if (!(condition))                                                                          \
+            abort();                                                                               \
+    } while (0)
+
+static bool read_query(char *text, struct pen_request *request, struct pen_error *error)
+{
+    struct pen_query_pair pairs[300];
+    uint32_t count = 0;
+    for (char *at = text; at && *at && count < 300;) {
+        char *next = strchr(at, '\n');
+        if (next)
+            *next++ = 0;
+        char *equals = strchr(at, '=');
+        if (equals)
+            *equals++ = 0;
+        pairs[count++] = (struct pen_query_pair){at, equals};
+        at = next;
+    }
+    return pen_request_from_query(pairs, count, &fake_catalogue, request, error);
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
+{
+    struct pen_request request, back;
+    struct pen_error error = {0};
+    bool ok;
+    if (size && data[0] == 'q') {
+        char *text = malloc(size);
+        memcpy(text, data + 1, size - 1);
+        text[size - 1] = 0;
+        ok = read_query(text, &request, &error);
+        free(text);
+    } else
+        ok = pen_request_from_json((const char *)data, size, &fake_catalogue, &request, &error);
+    REQUIRE(ok == (error.code == PEN_OK));
+    if (!ok) {
+        struct pen_error nothing = {0};
+        REQUIRE(error.code >= 400 && error.code < 500 && error.message[0]);
+        char *problem = pen_problem_json(&error, NULL);
+        REQUIRE(pen_json_scan(problem, strlen(problem), 32, &nothing));
+        free(problem);
+        return 0;
+    }
+    char *text = pen_request_json(&request, &fake_catalogue);
+    REQUIRE(pen_request_from_json(text, strlen(text), &fake_catalogue, &back, &error));
+    REQUIRE(!memcmp(&request, &back, sizeof back));
+    free(text);
+    return 0;
+}

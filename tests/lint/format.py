@@ -1,0 +1,27 @@
+"""clang-format has nothing to change in any C or C++ file. Exit 77 when it is not installed.
+format.py --fix rewrites the files instead."""
+import shutil
+import subprocess
+import sys
+
+import tree
+
+
+def main():
+    if not shutil.which("clang-format"):
+        print("clang-format is not installed")
+        sys.exit(77)
+    names = [name for name in tree.files() if name.endswith((".c", ".h", ".cpp"))]
+    if sys.argv[1:] == ["--fix"]:
+        subprocess.run(["clang-format", "-i", "-style=file"] + names, cwd=tree.ROOT, check=True)
+        return
+    result = subprocess.run(["clang-format", "--dry-run", "-Werror", "-style=file"] + names,
+                            cwd=tree.ROOT, capture_output=True, text=True)
+    problems = [line for line in result.stderr.splitlines() if "error:" in line]
+    if result.returncode and not problems:
+        problems = [result.stderr]
+    tree.finish(problems)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,111 @@
+"""Which folder may include what. The first rule whose pattern fits a file decides."""
+import fnmatch
+import re
+
+import tree
+
+FLOOR_1 = ["protocol/%s.h" % name for name in ("error", "param", "request", "result", "limits",
+                                               "technique_info")]
+PURE = set("""assert ctype errno fenv float inttypes limits locale math stdalign stdarg stdatomic
+    stdbool stddef stdint stdio stdlib string strings time""".split())
+SYSTEM = PURE | set("""byteswap dirent dlfcn endian fcntl fnmatch getopt glob immintrin libgen link
+    malloc poll pthread pwd sched semaphore setjmp signal spawn syscall termios threads unistd
+    x86intrin xmmintrin emmintrin""".split())
+SOCKETS = set("sys/socket sys/un netdb netinet/in netinet/tcp arpa/inet ifaddrs net/if".split())
+GL = ["GL/*", "EGL/*", "KHR/*", "cglm/*"]
+CXX_SHIMS = ["renderer/import/*.cpp", "renderer/encode/*.cpp"]
+
+# pattern of the including file, project headers it may include, headers of libraries, system headers
+RULES = [
+    (r"protocol/(error|param|request|result|limits|technique_info)\.[ch]", FLOOR_1, [], "pure"),
+    (r"protocol/.*", ["protocol/*"], ["cjson/cJSON.h"], "pure"),
+    (r"renderer/blob/.*", FLOOR_1 + ["renderer/blob/*"], [], "system"),
+    (r"renderer/generate/.*", FLOOR_1 + ["renderer/blob/*", "renderer/generate/*"],
+     ["cglm/*"], "system"),
+    (r"renderer/import/.*",
+     FLOOR_1 + ["renderer/blob/*", "renderer/import/*"],
+     ["tiny_gltf.h", "nlohmann/*", "cjson/cJSON.h", "meshoptimizer.h", "zip.h", "webp/*", "spng.h", "turbojpeg.h",
+      "seccomp.h", "cglm/*", "OpenImageIO/*", "openssl/*", "libdeflate.h", "zlib.h"], "system"),
+    (r"renderer/encode/.*", FLOOR_1 + ["renderer/renderer.h", "renderer/encode/*"],
+     ["OpenImageIO/*", "isa-l.h", "isa-l/*", "webp/*"], "system"),
+    (r"renderer/trace/.*", FLOOR_1 + ["renderer/*"], ["embree3/*"] + GL, "system"),
+    (r"renderer/.*", FLOOR_1 + ["renderer/*"], GL, "system"),
+    (r"server/.*",
+     ["protocol/*", "server/*", "renderer/renderer.h", "renderer/encode/encode.h",
+      "renderer/blob/pscene.h", "renderer/blob/builder.h", "renderer/import/import_process.h",
+      "renderer/import/bundle.h", "renderer/generate/generate.h", "renderer/metrics/*.h",
+      "renderer/trace/*.h"],
+     ["cjson/cJSON.h", "microhttpd.h", "openssl/*", "zlib.h", "seccomp.h", "isa-l.h", "isa-l/*"],
+     "sockets"),
+    (r"clients/.*",
+     ["protocol/*", "clients/*", "renderer/generate/generate.h", "renderer/blob/pscene.h",
+      "renderer/import/bundle.h", "renderer/metrics/*.h"],
+     ["cjson/cJSON.h", "curl/*", "zip.h", "openssl/*"], "sockets"),
+]
+# Tests may look into everything, and compare with other libraries.
+FREE = r"tests/.*"
+# No part of the renderer may know of these, whatever the table says. The importer, a program of its
+# own, is the one that reads JSON: glTF is JSON.
+NOT_BELOW_SERVER = ["microhttpd.h", "curl/*"]
+
+
+def fits(name, patterns):
+    return any(fnmatch.fnmatchcase(name, pattern) for pattern in patterns)
+
+
+def system_allowed(header, kind):
+    name = header[:-2] if header.endswith(".h") else header
+    if kind == "pure":
+        return name in PURE
+    if name in SOCKETS:
+        return kind == "sockets"
+    return name in SYSTEM or name.startswith(("sys/", "linux/", "asm/"))
+
+
+def check_include(name, line, quoted, header, problems):
+    if re.fullmatch(FREE, name):
+        return
+    for pattern, project, libraries, kind in RULES:
+        if not re.fullmatch(pattern, name):
+            continue
+        if quoted:
+            ok = fits(header, project)
+        elif name.endswith(".cpp") and "." not in header:
+            ok = True  # the standard library of C++, in a shim
+        else:
+            ok = fits(header, libraries) or system_allowed(header, kind)
+        if name.startswith("renderer/") and not quoted and fits(header, NOT_BELOW_SERVER):
+            ok = False
+        if not ok:
+            problems.append("%s:%d: may not include %s" % (name, line, header))
+        return
+    problems.append("%s:%d: no rule says what this file may include" % (name, line))
+
+
+def main():
+    problems, users_of_microhttpd, shims = [], set(), {}
+    for name in tree.files():
+        if name.endswith((".cpp", ".cc", ".cxx", ".hpp", ".hh")):
+            folder = name.rsplit("/", 1)[0]
+            if not fits(name, CXX_SHIMS):
+                problems.append("%s: C++ outside the two shims" % name)
+            elif folder in shims:
+                problems.append("%s: a second shim beside %s" % (name, shims[folder]))
+            shims[folder] = name
+        if not name.endswith((".c", ".h", ".cpp")):
+            continue
+        for number, text in enumerate(tree.read(name).splitlines(), 1):
+            found = re.match(r'\s*#\s*include\s*([<"])([^>"]+)[>"]', text)
+            if not found:
+                continue
+            if found[2] == "microhttpd.h" and not name.startswith("tests/"):
+                users_of_microhttpd.add(name)
+            check_include(name, number, found[1] == '"', found[2], problems)
+    if len(users_of_microhttpd) > 1:
+        problems.append("microhttpd.h is included by more than one file: %s" %
+                        ", ".join(sorted(users_of_microhttpd)))
+    tree.finish(problems)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
 """Writes hostile uploads into a folder: each must be answered with a 4xx, quickly, in bounded memory.
 
-    hostile_files.py FOLDER        writes every file; names end in .gltf, .glb, .zip, .bundle (scenes)
-                                   or .png, .jpg, .webp (images)
+    hostile_files.py FOLDER            writes every file; names end in .gltf, .glb, .zip, .bundle
+                                       (scenes) or .png, .jpg, .webp (images)
+    hostile_files.py --seeds FOLDER    the small ones, and some good files: a corpus for the fuzzer
 
 Other tests import it and go through files(), which yields (name, bytes).
 """
@@ -408,17 +409,31 @@ def files():
         yield from group()
 
 
+def good_files():
+    yield "good.gltf", gltf()
+    yield "good.glb", glb(document(buffers=[{"byteLength": 36}]))
+    yield "good-indexed.gltf", with_indices([0, 1, 2])
+    yield "good-textured.gltf", textured(png(8, 8))
+    yield "good.zip", zipped([("s.gltf", with_uri("a.bin")), ("a.bin", TRIANGLE)])
+    yield "good.bundle", bundle([("s.gltf", with_uri("a.bin")), ("a.bin", TRIANGLE)])
+    yield "good.png", png(8, 8)
+
+
 def main():
-    folder = sys.argv[1]
+    seeds = sys.argv[1] == "--seeds"
+    folder = sys.argv[-1]
     os.makedirs(folder, exist_ok=True)
     for old in os.listdir(folder):
         os.unlink(os.path.join(folder, old))
     names = set()
-    for name, data in files():
-        assert name not in names, name
-        names.add(name)
-        with open(os.path.join(folder, name), "wb") as file:
-            file.write(data)
+    for group in [files()] + ([good_files()] if seeds else []):
+        for name, data in group:
+            assert name not in names, name
+            names.add(name)
+            if seeds and len(data) > 32768:
+                continue
+            with open(os.path.join(folder, name), "wb") as file:
+                file.write(data)
 
 
 if __name__ == "__main__":

@@ -35,7 +35,7 @@ static const struct pen_param request_rows[] = {
         .help = "Curve between radiance and the display; none clips at 1."),
     REQUEST(antialias, .def = 1, .min = 1, .max = PEN_MAX_ANTIALIAS, .unit = "frames",
         .help = "Jittered frames averaged into the image."),
-    REQUEST(classify, .def = 0,
+    REQUEST(classify, .def = 1,
         .help = "Skips pixels that a min-max pyramid proves lit or in umbra, where the method can."),
     REQUEST(time_s, .def = 0, .min = 0, .max = 1e6, .unit = "s",
         .help = "Time at which animated emission is shown."),

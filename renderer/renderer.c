@@ -100,6 +100,8 @@ void pen_renderer_destroy(struct pen_renderer *r)
     gl_samplers_finish(&r->ctx.samplers);
     gl_programs_destroy(r->ctx.programs);
     gl_texture_destroy(&r->ctx.white);
+    gl_texture_destroy(&r->ctx.tiles);
+    gl.DeleteFramebuffers(1, &r->ctx.tiles_framebuffer);
     gl_texture_destroy(&r->ctx.interleaved);
     gl_texture_destroy(&r->ctx.sample_scratch);
     gl_texture_destroy(&r->ctx.sum);

@@ -70,6 +70,8 @@ static void upload_materials(struct scene *s)
             memcpy(r->transforms[k] + 4, ref->transform + 3, 12);
         }
         s->has_emission |= m->emissive[0] + m->emissive[1] + m->emissive[2] > 0;
+        bool gloss = m->flags & PSC_SPECULAR_GLOSSINESS ? m->glossiness > 0.5f : m->roughness < 0.5f;
+        s->has_gloss |= gloss || m->surface.texture >= 0;
         s->has_unlit |= (m->flags & PSC_UNLIT) != 0;
     }
     s->materials = make_buffer(s, records, n * sizeof *records);
@@ -344,9 +346,12 @@ uint64_t scene_draw(struct scene *s, const struct cull_view *view, const struct 
         abort();
     for (uint32_t g = 0; g < s->group_count; g++) {
         runs[g].first = total;
-        for (uint32_t i = 0; i < s->groups[g].count; i++)
-            triangles += cull_instance(view, &s->blob, s->order[s->groups[g].first + i],
-                s->groups[g].double_sided, s->command_room, &total);
+        for (uint32_t i = 0; i < s->groups[g].count; i++) {
+            uint32_t instance = s->order[s->groups[g].first + i];
+            if (!pass->hidden || !pass->hidden[instance])
+                triangles += cull_instance(view, &s->blob, instance, s->groups[g].double_sided,
+                    s->command_room, &total);
+        }
         runs[g].count = total - runs[g].first;
     }
     if (!total)

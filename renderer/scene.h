@@ -25,6 +25,7 @@ struct scene {
     uint32_t group_count;
     struct cull_command *command_room;
     bool has_emission, has_unlit;
+    bool has_gloss; /* some roughness is below 0.5 */
     uint64_t bytes;
     uint64_t last_use;
     void *trace; /* owned by the tracer when there is one; freed through trace_free */
@@ -48,6 +49,7 @@ struct scene_pass {
     GLuint opaque, textured;
     bool full; /* draws with all attributes and textures; else positions only where it can */
     bool front_is_clockwise; /* the target's y axis is flipped */
+    const bool *hidden; /* instances to leave out, or NULL */
 };
 /* Returns the triangles drawn. The caller has bound framebuffer, viewport and depth state. */
 uint64_t scene_draw(

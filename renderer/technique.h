@@ -25,6 +25,8 @@ struct technique_ctx {
     GLuint empty_array;   /* vertex array for passes that make their own vertices */
     GLuint light_block, param_block; /* uniform buffers, GL_UBO_LIGHT and GL_UBO_PARAMS */
     struct gl_texture white; /* 1 x 1, bound where a light has no emission texture */
+    struct gl_texture tiles; /* of passes/classify.c */
+    GLuint tiles_framebuffer;
     struct gl_texture interleaved; /* scratch of passes/interleave.c */
     GLuint interleaved_framebuffer;
     struct gl_texture sample_scratch; /* of passes/sample_maps.c */
@@ -79,5 +81,7 @@ enum {
     UNIT_EMITTED,   /* gbuffer.emission */
     UNIT_EMISSION,  /* emission texture of the light */
     UNIT_SHADOW,    /* the method's depth map, nearest, border 1 */
-    UNIT_FREE       /* first of eight units that are the method's own */
+    UNIT_FREE,      /* first of seven units that are the method's own */
+    UNIT_MIN_MAX = 14, /* what min_max.glsl reads */
+    UNIT_TILES = 15    /* what tiles.vert reads */
 };

@@ -22,6 +22,7 @@ bool pass_interleaved(
     struct pass_screen second = {.name = "interleave",
         .body = "interleave.glsl",
         .textures = &source,
-        .texture_count = 1};
+        .texture_count = 1,
+        .tiles = pass->tiles};
     return pass_screen(run, &first, error) && pass_screen(run, &second, error);
 }

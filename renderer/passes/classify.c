@@ -27,8 +27,8 @@ static void count_classes(struct technique_run *run, const struct gl_texture *ti
     free(classes);
 }
 
-static bool fill_umbra(
-    struct technique_run *run, const struct gl_texture *tiles, struct pen_error *error)
+bool pass_fill_umbra(struct technique_run *run, const struct gl_texture *tiles, GLuint framebuffer,
+    struct pen_error *error)
 {
     struct gl_program_desc desc = {.vertex = "tiles.vert",
         .fragment = "constant.frag",
@@ -36,7 +36,7 @@ static bool fill_umbra(
     GLuint program = gl_programs_get(run->ctx->programs, &desc, error);
     if (!program)
         return false;
-    pass_draw_tiles(run->ctx, program, run->vis_framebuffer, tiles, TILE_UMBRA, run->width,
+    pass_draw_tiles(run->ctx, program, framebuffer, tiles, TILE_UMBRA, run->width,
         run->height, false);
     return true;
 }
@@ -72,7 +72,7 @@ const struct gl_texture *pass_classify(struct technique_run *run, const struct s
                 .extra = &block,
                 .extra_bytes = sizeof block},
             error) ||
-        !fill_umbra(run, tiles, error))
+        !pass_fill_umbra(run, tiles, run->vis_framebuffer, error))
         return NULL;
     count_classes(run, tiles);
     return tiles;

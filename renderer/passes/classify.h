@@ -13,3 +13,7 @@ enum tile_class { TILE_LIT, TILE_UNDECIDED, TILE_UMBRA, TILE_EMPTY };
  * valid until the next call; pass it to pass_screen as `tiles`. */
 const struct gl_texture *pass_classify(struct technique_run *run, const struct shadow_input *casters,
     float margin_texels, struct pen_error *error);
+
+/* Writes 0 to the umbra tiles of another target, such as a method's scratch. */
+bool pass_fill_umbra(struct technique_run *run, const struct gl_texture *tiles, GLuint framebuffer,
+    struct pen_error *error);

@@ -1,4 +1,5 @@
 #include "renderer/passes/interleave.h"
+#include "renderer/passes/classify.h"
 #include <stdio.h>
 
 bool pass_interleaved(
@@ -24,5 +25,8 @@ bool pass_interleaved(
         .textures = &source,
         .texture_count = 1,
         .tiles = pass->tiles};
+    if (pass->tiles &&
+        !pass_fill_umbra(run, pass->tiles, ctx->interleaved_framebuffer, error))
+        return false;
     return pass_screen(run, &first, error) && pass_screen(run, &second, error);
 }

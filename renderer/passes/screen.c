@@ -1,5 +1,6 @@
 #include "renderer/passes/passes.h"
 #include "renderer/passes/classify.h"
+#include <stdio.h>
 
 static void bind_textures(
     struct technique_ctx *ctx, const struct pass_texture *textures, uint32_t count)
@@ -64,10 +65,13 @@ void pass_draw_tiles(struct technique_ctx *ctx, GLuint program, GLuint framebuff
 bool pass_screen(struct technique_run *run, const struct pass_screen *pass, struct pen_error *error)
 {
     struct technique_ctx *ctx = run->ctx;
+    char defines[1024];
+    snprintf(defines, sizeof defines, "#define LIGHT_SHAPE %d\n#define LIGHT_PARALLEL %d\n%s",
+        run->face->shape, run->face->parallel, pass->defines ? pass->defines : "");
     struct gl_program_desc desc = {.vertex = pass->tiles ? "tiles.vert" : "screen.vert",
         .fragment = "screen.frag",
         .body = pass->body,
-        .defines = pass->defines,
+        .defines = defines,
         .info = &run->technique->info,
         .params = run->params};
     GLuint program = gl_programs_get(ctx->programs, &desc, error);

@@ -55,7 +55,8 @@ void frame_targets_finish(struct frame_targets *t)
     memset(t, 0, sizeof *t);
 }
 
-static void fit_sum(struct gl_texture *texture, GLuint *framebuffer, uint32_t width, uint32_t height)
+static void fit_sum(
+    struct gl_texture *texture, GLuint *framebuffer, uint32_t width, uint32_t height)
 {
     static const float zero[4] = {0};
     if (gl_texture_fit(texture, GL_RGBA32F, width, height, 0, 1) || !*framebuffer) {
@@ -264,8 +265,8 @@ static bool render_jittered(struct frame *f, uint32_t number, struct pen_error *
     upload_view(f, number);
     return pass_gbuffer(f->job->ctx, f->job->scene, &f->view, r->ground.on,
                &f->job->targets->gbuffer, &f->triangles, error) &&
-        (!(beauty || visibility) || record_visibility(f, error)) &&
-        (!beauty || shade(f, error)) && (!visibility || add_visibility(f, error));
+           (!(beauty || visibility) || record_visibility(f, error)) &&
+           (!beauty || shade(f, error)) && (!visibility || add_visibility(f, error));
 }
 
 bool frame_render(const struct frame_job *job, struct pen_frame *frame, struct pen_result *result,

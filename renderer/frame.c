@@ -28,6 +28,7 @@ struct frame {
     GLuint view_buffer;
     struct pen_result *result;
     uint64_t triangles;
+    uint32_t number; /* of the jittered frame */
 };
 
 static void release(GLuint *framebuffer, struct gl_texture *texture)
@@ -155,7 +156,8 @@ static bool record_face(
         .emission = emission ? emission : &ctx->white,
         .result = f->result,
         .width = job->request->width,
-        .height = job->request->height};
+        .height = job->request->height,
+        .frame = f->number};
     return job->technique->record(&run, error);
 }
 
@@ -262,6 +264,7 @@ static bool render_jittered(struct frame *f, uint32_t number, struct pen_error *
 {
     const struct pen_request *r = f->job->request;
     bool beauty = frame_output_needs_beauty(r), visibility = frame_output_needs_visibility(r);
+    f->number = number;
     upload_view(f, number);
     return pass_gbuffer(f->job->ctx, f->job->scene, &f->view, r->ground.on,
                &f->job->targets->gbuffer, &f->triangles, error) &&

@@ -60,6 +60,7 @@ struct technique_run {
     const struct gl_texture *emission; /* of the light, with mips, or ctx->white */
     struct pen_result *result;         /* warnings and counts */
     uint32_t width, height;            /* px of vis and G-buffer */
+    uint32_t frame;                    /* number of the jittered frame */
 };
 
 struct technique {

@@ -65,8 +65,8 @@ static void extensions(void)
 {
     refused(ASSET ",\"extensionsRequired\":[\"KHR_mesh_quantization\",\"ACME_magic\"]}",
         PEN_UNPROCESSABLE, "/extensionsRequired", "ACME_magic");
-    struct imported r = import_json(ASSET
-        ",\"extensionsUsed\":[\"KHR_materials_clearcoat\",\"KHR_texture_transform\",\"A\\u00e9\"]}");
+    struct imported r = import_json(ASSET ",\"extensionsUsed\":[\"KHR_materials_clearcoat\",\"KHR_"
+                                          "texture_transform\",\"A\\u00e9\"]}");
     CHECK(r.ok && has_warning(&r.scene, "KHR_materials_clearcoat"));
     CHECK(r.ok && !has_warning(&r.scene, "KHR_texture_transform") && has_warning(&r.scene, "A??"));
     imported_free(&r);

@@ -121,8 +121,8 @@ static int landlock_stops_open(void)
         prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0);
         if (!pen_sandbox_enter_landlock())
             _exit(0);
-        _exit(open("/etc/passwd", O_RDONLY) >= 0 || errno != EACCES ||
-              write(writable, "x", 1) != 1);
+        _exit(
+            open("/etc/passwd", O_RDONLY) >= 0 || errno != EACCES || write(writable, "x", 1) != 1);
     }
     int status = 0;
     waitpid(pid, &status, 0);

@@ -30,15 +30,16 @@ struct PlaneInWindow {
 PlaneInWindow plane_in_window(ReceiverPlane plane, vec2 offset, vec2 extent, float bias)
 {
     // The normal comes from a half-float buffer, so the slope has an error of its own.
-    float reach = 1.02 * dot(abs(plane.gradient), extent);
-    float center = min(plane.depth + dot(plane.gradient, offset), 1.0);
+    float reach = 1.05 * dot(abs(plane.gradient), extent);
+    float center = plane.depth + dot(plane.gradient, offset);
     // What clamping to the far plane takes from the mean: exact when the slope follows one axis,
     // else an upper bound. Unit depth is a convex function of hardware depth, so the mean of the
     // one is not below the other taken at the mean.
-    float over = max(reach - (1.0 - center), 0.0);
+    float over = clamp(center + reach - 1.0, 0.0, 2.0 * reach);
+    float mean = min(center - over * over / max(4.0 * reach, 1e-20), 1.0);
     PlaneInWindow r;
-    r.mean = depth_unit(max(center - over * over / max(4.0 * reach, 1e-20), 0.0)) - bias;
-    r.lowest = depth_unit(max(center - reach, 0.0)) - bias;
+    r.mean = depth_unit(max(mean, 0.0)) - bias;
+    r.lowest = depth_unit(clamp(center - reach, 0.0, 1.0)) - bias;
     r.highest = depth_unit(clamp(center + reach, 0.0, 1.0)) - bias;
     return r;
 }

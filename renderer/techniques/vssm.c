@@ -1,3 +1,4 @@
+#include "renderer/passes/interleave.h"
 #include "renderer/passes/sat.h"
 #include "renderer/techniques/map_params.h"
 
@@ -9,7 +10,8 @@ struct vssm {
     uint32_t subdivide;
     int32_t levels;
     int32_t leaf_grid;
-    float max_slope;
+    float tolerance;
+    pen_flag smooth;
     float min_variance;
     float bleed;
     float min_filter;
@@ -24,10 +26,13 @@ static const struct pen_param rows[] = {
                 "never."),
     PARAM(struct vssm, levels, .def = 2, .min = 1, .max = 4, .specialise = 1,
         .help = "Times a window is halved at most."),
-    PARAM(struct vssm, leaf_grid, .def = 2, .min = 1, .max = 4, .specialise = 1,
+    PARAM(struct vssm, leaf_grid, .def = 1, .min = 1, .max = 4, .specialise = 1,
         .help = "Side of the grid of depth comparisons in a part that cannot be split further."),
-    PARAM(struct vssm, max_slope, .def = 1, .min = 0, .max = 1000,
-        .help = "Splits where the receiver spans more of the depth to its blockers than this."),
+    PARAM(struct vssm, tolerance, .def = 0.25, .min = 0, .max = 1000,
+        .help = "How far a part may be from two planes, relative to their distance, before it is "
+                "split."),
+    PARAM(struct vssm, smooth, .def = 1, .specialise = 1,
+        .help = "Shifts comparisons per pixel and averages 4 x 4 pixels of wide penumbrae."),
     PARAM(struct vssm, min_variance, .def = 1e-5, .min = 0, .max = 0.01,
         .help = "Least variance of depth, in squares of the map's depth range."),
     PARAM(struct vssm, bleed, .def = 0, .min = 0, .max = 0.9,
@@ -51,15 +56,14 @@ static bool record(struct technique_run *run, struct pen_error *error)
         return false;
     struct pass_texture textures[] = {{UNIT_FREE + 1, sat->textures[0].name, GL_SAMPLE_NEAREST},
         {UNIT_MIN_MAX, min_max->textures[0].name, GL_SAMPLE_NEAREST}};
-    return pass_screen(run,
-        &(struct pass_screen){.name = "vssm",
-            .body = "vssm.glsl",
-            .shadow = &map->textures[0],
-            .textures = textures,
-            .texture_count = 2,
-            .extra = &block,
-            .extra_bytes = sizeof block},
-        error);
+    struct pass_screen pass = {.name = "vssm",
+        .body = "vssm.glsl",
+        .shadow = &map->textures[0],
+        .textures = textures,
+        .texture_count = 2,
+        .extra = &block,
+        .extra_bytes = sizeof block};
+    return params->smooth.on ? pass_interleaved(run, &pass, error) : pass_screen(run, &pass, error);
 }
 
 const struct technique technique_vssm = {

@@ -10,14 +10,15 @@ static bool build(struct technique_run *run, const struct shadow_key *key,
     static const GLenum formats[] = {GL_RG32F, GL_RGBA32F, GL_RGBA32F, GL_RGBA16};
     static const char *const defines[] = {
         "#define VARIANCE\n", "#define EXPONENTIAL\n", NULL, NULL};
-    uint32_t kind = key->extra[KEY_KIND];
+    uint32_t kind = key->extra[KEY_KIND], margin = key->extra[KEY_BLUR] + 2;
+    uint32_t side = key->size + 2 * margin;
     const struct shadow_input *depth = pass_depth_map(run, key->size, error);
     if (!depth)
         return false;
     struct gl_texture *map = &input->textures[0];
-    *map = gl_texture_create(formats[kind], key->size, key->size, 0, 0);
+    *map = gl_texture_create(formats[kind], side, side, 0, 0);
     GLuint framebuffer = gl_framebuffer_create(&(const struct gl_texture *){map}, 1, NULL);
-    float exponents[4] = {0};
+    float exponents[4] = {0, 0, (float)margin};
     memcpy(exponents, &key->extra[KEY_EXPONENTS], 8);
     struct pass_texture source = {UNIT_FREE, depth->textures[0].name, GL_SAMPLE_NEAREST};
     bool ok = pass_fill(run->ctx,
@@ -28,8 +29,8 @@ static bool build(struct technique_run *run, const struct shadow_key *key,
             .textures = &source,
             .texture_count = 1,
             .framebuffer = framebuffer,
-            .width = key->size,
-            .height = key->size,
+            .width = side,
+            .height = side,
             .extra = exponents,
             .extra_bytes = sizeof exponents},
         error);

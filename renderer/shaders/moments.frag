@@ -5,13 +5,15 @@
 #include "moments.glsl"
 layout(binding = 7) uniform sampler2D source; // hardware depth
 layout(std140, binding = 3) uniform MomentBlock {
-    vec4 exponents; // xy
+    vec4 exponents; // xy; z: empty texels around the map
 } moment;
 layout(location = 0) out vec4 result;
 
 float load(ivec2 at)
 {
-    return depth_unit(texelFetch(source, clamp(at, ivec2(0), textureSize(source, 0) - 1), 0).r);
+    ivec2 last = textureSize(source, 0) - 1;
+    bool inside = all(equal(clamp(at, ivec2(0), last), at));
+    return inside ? depth_unit(texelFetch(source, at, 0).r) : 1.0;
 }
 
 // The smaller one of both one-sided differences: the slope of the surface, not of a silhouette.
@@ -22,7 +24,7 @@ float slope(float before, float here, float after)
 
 void main()
 {
-    ivec2 at = ivec2(gl_FragCoord.xy);
+    ivec2 at = ivec2(gl_FragCoord.xy) - int(moment.exponents.z);
     float u = load(at);
 #if defined(VARIANCE)
     vec2 d = vec2(slope(load(at - ivec2(1, 0)), u, load(at + ivec2(1, 0))),

@@ -12,21 +12,20 @@ struct MomentLookup {
 MomentLookup moment_lookup(Surface s)
 {
     MomentLookup r;
-    vec2 q = light_project(s.p), uv = light_uv(q), texel = light_texel(moment_map);
+    // Around the depth map lies a margin, in which nothing is, for the kernel to run out.
+    float margin = float(P(blur) + 2u), size = float(textureSize(moment_map, 0).x) - 2.0 * margin;
+    vec2 uv = (light_uv(light_project(s.p)) * size + margin) / (size + 2.0 * margin);
+    vec2 texel = (light.rect.zw - light.rect.xy) / size;
     // The level whose texels are as large as the pixel, seen head-on: derivatives of uv jump where
     // surfaces meet.
     float pixel = view.forward.w / (s.depth * view.eye.w);
     pixel *= light.parallel != 0 ? 1.0 : light.near_z / s.p.z;
-    float last = log2(float(textureSize(moment_map, 0).x));
+    float last = log2(size);
     float lod = clamp(log2(pixel / max(texel.x, texel.y)), 0.0, last);
     r.m = textureLod(moment_map, uv, lod);
     vec2 reach = (float(P(blur)) + 1.5 * exp2(ceil(lod))) * texel;
     float bias = P(bias) * s.p.z / (light.far_z - light.near_z);
     r.plane = plane_in_window(receiver_plane(s.p, s.n), vec2(0.0), reach, bias);
     r.outside = any(lessThan(uv, vec2(0.0))) || any(greaterThan(uv, vec2(1.0)));
-    // Near the border texels repeat, and the mean of a plane is not its centre.
-    vec2 low = light.rect.xy + reach, high = light.rect.zw - reach;
-    if (any(lessThan(q, low)) || any(greaterThan(q, high)))
-        r.plane.mean = r.plane.lowest;
     return r;
 }

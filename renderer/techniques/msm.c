@@ -5,22 +5,22 @@ struct msm {
     uint32_t map_size;
     float bias;
     uint32_t blur;
-    uint32_t format;
+    uint32_t precision;
     float moment_bias;
     float bleed;
 };
 
-static const char *const format_names[] = {"float32", "unorm16", NULL};
+static const char *const precision_names[] = {"float32", "unorm16", NULL};
 
 static const struct pen_param rows[] = {
     MAP_SIZE_ROW(struct msm, 1024),
     BIAS_ROW(struct msm),
     PARAM(struct msm, blur, .def = 2, .min = 0, .max = 15, .unit = "texel",
         .help = "Radius of the Gaussian that the map is blurred with."),
-    PARAM(struct msm, format, .choices = format_names, .specialise = 1,
+    PARAM(struct msm, precision, .choices = precision_names, .specialise = 1,
         .help = "Numbers of the moment map: 16 or 8 bytes a texel."),
     PARAM(struct msm, moment_bias, .def = 0, .min = 0, .max = 0.01,
-        .help = "Share of a spread-out distribution mixed in against rounding; 0: by format."),
+        .help = "Share of a spread-out distribution mixed in against rounding; 0: by precision."),
     PARAM(struct msm, bleed, .def = 0, .min = 0, .max = 0.9,
         .help = "Visibility that counts as none; cuts light bleeding and narrows edges."),
 };
@@ -28,7 +28,7 @@ static const struct pen_param rows[] = {
 static bool record(struct technique_run *run, struct pen_error *error)
 {
     const struct msm *params = run->params;
-    struct moment_map desc = {.kind = params->format ? MOMENTS_FOUR_UNORM : MOMENTS_FOUR,
+    struct moment_map desc = {.kind = params->precision ? MOMENTS_FOUR_UNORM : MOMENTS_FOUR,
         .size = params->map_size,
         .blur = params->blur};
     const struct shadow_input *map = pass_moments(run, &desc, error);

@@ -5,6 +5,7 @@ struct mssm {
     uint32_t map_size;
     float bias;
     float kernel_bias;
+    int32_t parts;
     float moment_bias;
     float bleed;
     float min_filter;
@@ -14,8 +15,11 @@ struct mssm {
 static const struct pen_param rows[] = {
     MAP_SIZE_ROW(struct mssm, 1024),
     BIAS_ROW(struct mssm),
-    PARAM(struct mssm, kernel_bias, .def = 1, .min = 0, .max = 1,
+    PARAM(struct mssm, kernel_bias, .def = 0, .min = 0, .max = 1,
         .help = "Share of a sloped receiver's depth within the window that its bias follows."),
+    PARAM(struct mssm, parts, .def = 2, .min = 1, .max = 4, .specialise = 1,
+        .help =
+            "Parts per side of a window, each with moments of its own; 1: the published method."),
     PARAM(struct mssm, moment_bias, .def = 6e-6, .min = 0, .max = 0.01,
         .help = "Share of a spread-out distribution mixed in against rounding."),
     PARAM(struct mssm, bleed, .def = 0, .min = 0, .max = 0.9,

@@ -17,6 +17,18 @@ vec4 window_moments(vec2 low, vec2 high, bool exact)
     return moments_bias(moments_unpack(packed_mean), P(moment_bias));
 }
 
+// Share of blockers (x) and that times their mean depth (y) in a part of the window.
+vec2 part_blockers(vec2 low, vec2 high, bool exact, vec2 q, ReceiverPlane plane, float bias)
+{
+    vec2 texel = sat_texel();
+    vec2 offset = 0.5 * (low + high) * texel + light.rect.xy - q;
+    PlaneInWindow t = plane_in_window(plane, offset, 0.5 * (high - low) * texel, bias);
+    // A slope may shadow itself: it can be compared with a nearer part of it.
+    float depth = 2.0 * mix(t.mean, t.lowest, P(kernel_bias)) - 1.0;
+    vec2 blockers = moment_blockers(window_moments(low, high, exact), depth, 1e-3);
+    return vec2(blockers.x, blockers.x * clamp(blockers.y, -1.0, depth));
+}
+
 vec4 visibility(Surface s)
 {
     vec2 q = light_project(s.p), texel = sat_texel(), least = P(min_filter) * texel;
@@ -38,18 +50,16 @@ vec4 visibility(Surface s)
         vec2 size = high - low;
         // What lies outside the map is lit.
         float inside = size.x * size.y * texel.x * texel.y / (4.0 * extent.x * extent.y);
-        v = 1.0;
-        if (min(size.x, size.y) < 1e-3)
-            break;
-        vec2 offset = 0.5 * (low + high) * texel + light.rect.xy - q;
-        PlaneInWindow t = plane_in_window(plane, offset, 0.5 * size * texel, bias);
-        // A slope would shadow itself: compared with a nearer part of it, in a wider window more.
-        float depth = 2.0 * mix(t.mean, t.lowest, P(kernel_bias)) - 1.0;
-        vec4 b = window_moments(low, high, i > 0);
-        vec2 blockers = moment_blockers(b, depth, 1e-3);
-        float shadow = blockers.x;
+        int parts = min(size.x, size.y) < 2.0 * float(P(parts)) ? 1 : P(parts);
+        parts = min(size.x, size.y) > 1e-3 ? parts : 0;
+        vec2 step = size / float(max(parts, 1)), sum = vec2(0.0);
+        for (int k = 0; k < parts * parts; k++) {
+            vec2 from = low + vec2(k % parts, k / parts) * step;
+            sum += part_blockers(from, min(from + step, high), i > 0, q, plane, bias);
+        }
+        float shadow = sum.x / float(max(parts * parts, 1));
         if (i == 0) {
-            float z = depth_unit_to_z(0.5 + 0.5 * clamp(blockers.y, -1.0, depth));
+            float z = depth_unit_to_z(0.5 + 0.5 * sum.y / max(sum.x, 1e-6));
             z = clamp(z, min(nearest_z, s.p.z), s.p.z);
             extent = light_filter_extent(z, s.p.z);
             if (shadow > 0.99) {

@@ -31,7 +31,7 @@ struct light {
     uint32_t face_count;
     float casters[2][3]; /* world bounds of what can cast a shadow in this light */
     /* For shading, world space: */
-    float radiance[3];  /* emitted; point, spot: intensity, W sr^-1; sun: irradiance */
+    float radiance[3]; /* emitted; point, spot: intensity, W sr^-1; sun: irradiance */
     float origin[3], x[3], y[3], z[3];
 };
 
@@ -48,6 +48,9 @@ void light_face_clip(
 /* The window of the plane z = near_z through which `sample` sees all of `casters`. */
 void light_face_window(
     const struct light_face *face, const float casters[2][3], const float sample[2], float rect[4]);
+
+/* Marks the instances that cannot cast in this light: flat and on the far border of the bounds. */
+void light_find_backdrops(const struct light *light, const struct scene *scene, bool *backdrop);
 
 /* What a depth pass of this face culls with. */
 void light_face_cull(const struct light_face *face, const float sample[2], const float rect[4],

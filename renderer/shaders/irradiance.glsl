@@ -1,44 +1,46 @@
 // Irradiance at p (normal n) of emitters of unit radiance, all in world space, in closed form.
 
-// Lambert's formula, one edge between unit vectors a and b: its angle times the normal's component.
+// Angle over sine of an edge whose ends have this cosine: least-squares polynomial, error 1.6e-4 of
+// the factor, and exact relative to 2e-4 for lights of any size since it multiplies every edge.
+float angle_over_sine(float cosine)
+{
+    float x = abs(cosine);
+    float f = 1.5706395 + x * (-0.9914837 + x * (0.7078825 + x * (-0.3954492 + x * 0.1085248)));
+    return cosine >= 0.0 ? f : 3.14159265 * inversesqrt(max(1.0 - x * x, 1e-7)) - f;
+}
+
+// Lambert's formula, one edge from a to b: its angle times the component of its plane's normal
+// along n. One root serves both ends.
 float edge_integral(vec3 a, vec3 b, vec3 n)
 {
-    vec3 x = cross(a, b);
-    float s = length(x);
-    return s > 1e-7 ? dot(x, n) * atan(s, dot(a, b)) / s : 0.0;
+    float r = inversesqrt(max(dot(a, a) * dot(b, b), 1e-30));
+    return dot(cross(a, b), n) * r * angle_over_sine(clamp(dot(a, b) * r, -1.0, 1.0));
 }
 
-// Adds the edge a-b clipped at the horizon; remembers where the polygon leaves and enters.
-void add_edge(vec3 a, vec3 b, vec3 n, inout float sum, inout vec3 leave, inout vec3 enter)
+// The edge a-b without its part below the horizon; remembers where the polygon leaves and enters.
+// Selections instead of branches: software rasterisers run both sides of a branch anyway.
+float clipped_edge(vec3 a, vec3 b, float da, float db, vec3 n, inout vec3 leave, inout vec3 enter)
 {
-    float da = dot(a, n), db = dot(b, n);
-    if (da <= 0.0 && db <= 0.0)
-        return;
-    if (da < 0.0)
-        enter = a = a + (b - a) * (da / (da - db));
-    if (db < 0.0)
-        leave = b = a + (b - a) * (da / (da - db));
-    sum += edge_integral(normalize(a), normalize(b), n);
-}
-
-float close_polygon(float sum, vec3 leave, vec3 enter, vec3 n)
-{
-    if (leave != vec3(0.0) && enter != vec3(0.0))
-        sum += edge_integral(normalize(leave), normalize(enter), n);
-    return 0.5 * abs(sum);
+    float across = da - db;
+    vec3 cut = a + (b - a) * (da / (abs(across) > 1e-20 ? across : 1e-20));
+    leave = da >= 0.0 && db < 0.0 ? cut : leave;
+    enter = da < 0.0 && db >= 0.0 ? cut : enter;
+    float e = edge_integral(da < 0.0 ? cut : a, db < 0.0 ? cut : b, n);
+    return max(da, db) < 0.0 ? 0.0 : e;
 }
 
 float irradiance_rect(vec3 p, vec3 n, vec3 center, vec3 half_x, vec3 half_y)
 {
-    vec3 c = center - p, leave = vec3(0.0), enter = vec3(0.0);
-    vec3 a = c - half_x - half_y, b = c + half_x - half_y;
-    vec3 d = c + half_x + half_y, e = c - half_x + half_y;
-    float sum = 0.0;
-    add_edge(a, b, n, sum, leave, enter);
-    add_edge(b, d, n, sum, leave, enter);
-    add_edge(d, e, n, sum, leave, enter);
-    add_edge(e, a, n, sum, leave, enter);
-    return close_polygon(sum, leave, enter, n);
+    vec3 to = center - p;
+    vec3 a = to - half_x - half_y, b = to + half_x - half_y;
+    vec3 c = to + half_x + half_y, d = to - half_x + half_y;
+    vec4 above = vec4(dot(a, n), dot(b, n), dot(c, n), dot(d, n));
+    vec3 leave = vec3(0.0), enter = vec3(0.0);
+    float sum = clipped_edge(a, b, above.x, above.y, n, leave, enter) +
+        clipped_edge(b, c, above.y, above.z, n, leave, enter) +
+        clipped_edge(c, d, above.z, above.w, n, leave, enter) +
+        clipped_edge(d, a, above.w, above.x, n, leave, enter);
+    return 0.5 * abs(sum + edge_integral(leave, enter, n)); // the cut closes along the horizon
 }
 
 // A disk as the regular polygon of the same area.
@@ -47,14 +49,16 @@ float irradiance_disk(vec3 p, vec3 n, vec3 center, vec3 half_x, vec3 half_y)
     const int sides = 12;
     const float widen = sqrt(3.14159265 / (0.5 * float(sides) * sin(6.2831853 / float(sides))));
     vec3 c = center - p, leave = vec3(0.0), enter = vec3(0.0), from = c + widen * half_x;
-    float sum = 0.0;
+    float sum = 0.0, below = dot(from, n);
     for (int i = 1; i <= sides; i++) {
         float t = 6.2831853 * float(i) / float(sides);
         vec3 to = c + widen * (cos(t) * half_x + sin(t) * half_y);
-        add_edge(from, to, n, sum, leave, enter);
+        float above = dot(to, n);
+        sum += clipped_edge(from, to, below, above, n, leave, enter);
         from = to;
+        below = above;
     }
-    return close_polygon(sum, leave, enter, n);
+    return 0.5 * abs(sum + edge_integral(leave, enter, n));
 }
 
 // A sphere, with the part below the horizon cut (Snyder 1996, area light sources).

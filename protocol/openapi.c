@@ -39,6 +39,7 @@ static void write_content(struct pen_json *json, enum pen_body body)
     switch (body) {
     case PEN_BODY_SCENE_UPLOAD:
         write_media(json, "model/gltf-binary", NULL);
+        write_media(json, "model/gltf+json", NULL);
         write_media(json, "multipart/form-data", NULL);
         write_media(json, "application/zip", NULL);
         break;
@@ -58,11 +59,30 @@ static void write_content(struct pen_json *json, enum pen_body body)
     pen_json_end(json);
 }
 
+static void write_image_headers(struct pen_json *json)
+{
+    static const char *const headers[][2] = {
+        {"ETag", "Strong; the same request gives the same image."},
+        {"Server-Timing", "Milliseconds per stage."},
+        {"X-Penumbra-Warning", "What the method could not do; once per warning."},
+    };
+    pen_json_object(json, "headers");
+    for (int i = 0; i < 3; i++) {
+        pen_json_object(json, headers[i][0]);
+        pen_json_string(json, "description", headers[i][1]);
+        pen_json_raw(json, "schema", "{\"type\":\"string\"}");
+        pen_json_end(json);
+    }
+    pen_json_end(json);
+}
+
 static void write_response(
     struct pen_json *json, const char *status, const char *description, enum pen_body body)
 {
     pen_json_object(json, status);
     pen_json_string(json, "description", description);
+    if (body == PEN_BODY_IMAGE)
+        write_image_headers(json);
     if (body != PEN_BODY_NONE)
         write_content(json, body);
     pen_json_end(json);

@@ -309,14 +309,18 @@ static const char *const answers[][2] = {
         "\"fov_y_deg\":{\"type\":\"number\"}}}},\"lights\":{\"type\":\"array\",\"items\":{\"type\":"
         "\"object\",\"properties\":{\"name\":{\"type\":\"string\"},\"light\":{\"$ref\":\"" SCHEMA
         "Light\"}}}},\"warnings\":{\"type\":\"array\",\"items\":{\"type\":\"string\"}}}}"},
-    {"SceneList", "{\"type\":\"object\",\"properties\":{\"scenes\":{\"type\":\"array\",\"items\":"
-                  "{\"$ref\":\"" SCHEMA "Scene\"}}}}"},
+    {"SceneList",
+        "{\"type\":\"object\",\"properties\":{\"scenes\":{\"type\":\"array\",\"items\":"
+        "{\"$ref\":\"" SCHEMA "Scene\"}},\"total\":{\"type\":\"integer\"},"
+        "\"next\":{\"type\":\"string\",\"description\":\"The next page, when there is one.\"}}}"},
     {"ImageInfo", "{\"type\":\"object\",\"properties\":{\"id\":{\"$ref\":\"" SCHEMA
                   "Id\"},\"width\":{\"type\":\"integer\"},\"height\":{\"type\":\"integer\"},"
                   "\"source_bytes\":{\"type\":\"integer\"},\"stored_bytes\":{\"type\":\"integer\"},"
                   "\"stored_at\":{\"type\":\"string\",\"format\":\"date-time\"}}}"},
-    {"ImageList", "{\"type\":\"object\",\"properties\":{\"images\":{\"type\":\"array\",\"items\":"
-                  "{\"$ref\":\"" SCHEMA "ImageInfo\"}}}}"},
+    {"ImageList",
+        "{\"type\":\"object\",\"properties\":{\"images\":{\"type\":\"array\",\"items\":"
+        "{\"$ref\":\"" SCHEMA "ImageInfo\"}},\"total\":{\"type\":\"integer\"},"
+        "\"next\":{\"type\":\"string\",\"description\":\"The next page, when there is one.\"}}}"},
     {"TechniqueInfo",
         "{\"type\":\"object\",\"properties\":{\"name\":{\"$ref\":\"" SCHEMA
         "TechniqueName\"},\"title\":{\"type\":\"string\"},\"summary\":{\"type\":\"string\"},"

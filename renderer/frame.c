@@ -3,6 +3,7 @@
 #include "renderer/passes/passes.h"
 #include <cglm/cglm.h>
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 /* As ViewBlock in view.glsl. */
@@ -239,12 +240,21 @@ static bool shade(struct frame *f, struct pen_error *error)
         {UNIT_SURFACE, t->gbuffer.surface.name, GL_SAMPLE_NEAREST},
         {UNIT_FREE, t->vis.name, GL_SAMPLE_NEAREST},
         {UNIT_EMITTED, t->gbuffer.emission.name, GL_SAMPLE_NEAREST}};
-    static const char *const variants[] = {
-        NULL, "#define EMIT\n", "#define RESOLVE\n", "#define RESOLVE\n#define EMIT\n"};
+    bool rect = false, round = false, punctual = false;
+    for (uint32_t i = 0; i < f->light_count; i++) {
+        uint32_t type = f->lights[i].source->type;
+        rect |= type == PEN_LIGHT_RECT;
+        round |= type == PEN_LIGHT_DISK || type == PEN_LIGHT_SPHERE;
+        punctual |= type >= PEN_LIGHT_SUN;
+    }
+    char defines[160];
+    snprintf(defines, sizeof defines, "%s%s%s%s%s", direct ? "#define RESOLVE\n" : "",
+        emission ? "#define EMIT\n" : "", rect ? "#define HAS_RECT\n" : "",
+        round ? "#define HAS_ROUND\n" : "", punctual ? "#define HAS_PUNCTUAL\n" : "");
     return pass_fill(job->ctx,
         &(struct pass_fill){.name = "shade",
             .fragment = "shade.frag",
-            .defines = variants[2 * direct + emission],
+            .defines = defines,
             .stage = PEN_STAGE_SHADE,
             .textures = textures,
             .texture_count = emission ? 6 : 5,

@@ -28,80 +28,148 @@ static void set_axes(struct light_face *f, const float o[3], const float x[3], c
     memcpy(f->world_to_light, m, sizeof m);
 }
 
-static void bounds_corner(const struct scene *scene, int i, float corner[3])
+/* World bounds of one instance: of its primitive's box, transformed (exact for a box). */
+static void instance_bounds(
+    const struct psc_scene *blob, uint32_t instance, float min[3], float max[3])
 {
-    const struct psc_header *h = scene->blob.header;
-    for (int k = 0; k < 3; k++)
-        corner[k] = i >> k & 1 ? h->bounds_max[k] : h->bounds_min[k];
+    const float *m = blob->instances[instance].world;
+    const struct psc_primitive *p = &blob->primitives[blob->instances[instance].primitive];
+    for (int row = 0; row < 3; row++) {
+        min[row] = max[row] = m[4 * row + 3];
+        for (int k = 0; k < 3; k++) {
+            float a = m[4 * row + k] * p->bounds_min[k], b = m[4 * row + k] * p->bounds_max[k];
+            min[row] += fminf(a, b);
+            max[row] += fmaxf(a, b);
+        }
+    }
 }
 
-static void light_corner(const struct light_face *f, const struct scene *scene, int i, float c[3])
+/* A flat floor or wall on the far side of the bounds has everything else between itself and the
+ * light: it receives, but it casts on nothing, and need not widen the map's window. */
+static bool is_backdrop(const struct scene *scene, const float min[3], const float max[3],
+    const float light[3], const float *sun_direction)
+{
+    const struct psc_header *h = scene->blob.header;
+    float flat = 1e-4f * scene_radius(scene);
+    for (int k = 0; k < 3; k++) {
+        if (max[k] - min[k] > flat)
+            continue;
+        bool light_above = sun_direction ? sun_direction[k] < 0 : light[k] > max[k];
+        bool light_below = sun_direction ? sun_direction[k] > 0 : light[k] < min[k];
+        if ((light_above && min[k] <= h->bounds_min[k] + flat) ||
+            (light_below && max[k] >= h->bounds_max[k] - flat))
+            return true;
+    }
+    return false;
+}
+
+void light_find_backdrops(const struct light *light, const struct scene *scene, bool *backdrop)
+{
+    bool sun = light->source->type == PEN_LIGHT_SUN;
+    for (uint32_t i = 0; i < scene->blob.instance_count; i++) {
+        float min[3], max[3];
+        instance_bounds(&scene->blob, i, min, max);
+        backdrop[i] = is_backdrop(scene, min, max, light->origin, sun ? light->z : NULL);
+    }
+}
+
+/* Bounds of everything that casts. Emitters with an extent are judged by their centre, which is
+ * enough: a backdrop lies on the border of all geometry. */
+static void caster_bounds(const struct scene *scene, const struct light *light, float bounds[2][3])
+{
+    bool any = false;
+    bool sun = light->source->type == PEN_LIGHT_SUN;
+    for (uint32_t i = 0; i < scene->blob.instance_count; i++) {
+        float min[3], max[3];
+        instance_bounds(&scene->blob, i, min, max);
+        if (is_backdrop(scene, min, max, light->origin, sun ? light->z : NULL))
+            continue;
+        for (int k = 0; k < 3; k++) {
+            bounds[0][k] = any ? fminf(bounds[0][k], min[k]) : min[k];
+            bounds[1][k] = any ? fmaxf(bounds[1][k], max[k]) : max[k];
+        }
+        any = true;
+    }
+    if (any)
+        return;
+    /* Nothing casts; the window only has to be valid. */
+    for (int k = 0; k < 3; k++) {
+        bounds[0][k] = scene_is_empty(scene) ? -1 : scene->blob.header->bounds_min[k];
+        bounds[1][k] = scene_is_empty(scene) ? 1 : scene->blob.header->bounds_max[k];
+    }
+}
+
+static void light_corner(const struct light_face *f, const float bounds[2][3], int i, float c[3])
 {
     float world[3];
-    bounds_corner(scene, i, world);
+    for (int k = 0; k < 3; k++)
+        world[k] = bounds[i >> k & 1][k];
     glm_mat4_mulv3((vec4 *)f->world_to_light, world, 1, c);
 }
 
-/* Nearest and farthest z of the meshlets in front of the light: tighter than the bounds' corners,
- * and the only thing that says something when the light is inside the bounds. */
-static void meshlet_range(const struct light_face *f, const struct scene *scene, float *near_z,
-    float *far_z)
+static void box_range(const struct light_face *f, const float bounds[2][3], float range[2])
 {
-    *near_z = INFINITY, *far_z = 0;
+    range[0] = INFINITY, range[1] = -INFINITY;
+    for (int i = 0; i < 8; i++) {
+        float c[3];
+        light_corner(f, bounds, i, c);
+        range[0] = fminf(range[0], c[2]);
+        range[1] = fmaxf(range[1], c[2]);
+    }
+}
+
+/* Nearest and farthest z of what lies in front of the light: by instance box and by meshlet sphere,
+ * whichever is tighter. A near plane that is too close widens every blocker search. */
+static void geometry_range(const struct light_face *f, const struct scene *scene, float range[2])
+{
+    range[0] = INFINITY, range[1] = 0;
     for (uint32_t i = 0; i < scene->blob.instance_count; i++) {
         const struct psc_instance *instance = &scene->blob.instances[i];
         const struct psc_primitive *p = &scene->blob.primitives[instance->primitive];
-        mat4 world = GLM_MAT4_IDENTITY_INIT, m;
-        for (int row = 0; row < 3; row++)
-            for (int column = 0; column < 4; column++)
-                world[column][row] = instance->world[4 * row + column];
-        glm_mat4_mul((vec4 *)f->world_to_light, world, m);
-        float scale = sqrtf(fmaxf(glm_vec3_norm2(world[0]),
-            fmaxf(glm_vec3_norm2(world[1]), glm_vec3_norm2(world[2]))));
-        /* One direction is enough: the z row of the matrix gives the exact extent along z. */
-        float z_scale = sqrtf(m[0][2] * m[0][2] + m[1][2] * m[1][2] + m[2][2] * m[2][2]);
+        float bounds[2][3], box[2], row[4];
+        instance_bounds(&scene->blob, i, bounds[0], bounds[1]);
+        box_range(f, bounds, box);
+        for (int k = 0; k < 4; k++) /* row z of world_to_light * world */
+            row[k] = f->world_to_light[0][2] * instance->world[k] +
+                f->world_to_light[1][2] * instance->world[4 + k] +
+                f->world_to_light[2][2] * instance->world[8 + k] +
+                (k == 3 ? f->world_to_light[3][2] : 0);
+        float scale = sqrtf(row[0] * row[0] + row[1] * row[1] + row[2] * row[2]);
         for (uint32_t k = 0; k < p->meshlet_count; k++) {
-            const struct psc_meshlet *meshlet = &scene->blob.meshlets[p->first_meshlet + k];
-            float z = m[0][2] * meshlet->center[0] + m[1][2] * meshlet->center[1] +
-                m[2][2] * meshlet->center[2] + m[3][2];
-            float r = fminf(scale, z_scale) * meshlet->radius;
-            if (z + r <= 0)
+            const struct psc_meshlet *m = &scene->blob.meshlets[p->first_meshlet + k];
+            float z = row[0] * m->center[0] + row[1] * m->center[1] + row[2] * m->center[2] + row[3];
+            float near_z = fmaxf(z - scale * m->radius, box[0]);
+            float far_z = fminf(z + scale * m->radius, box[1]);
+            if (far_z <= 0)
                 continue;
-            *near_z = fminf(*near_z, z - r);
-            *far_z = fmaxf(*far_z, z + r);
+            range[0] = fminf(range[0], near_z);
+            range[1] = fmaxf(range[1], far_z);
         }
     }
 }
 
 static void fit_range(struct light_face *f, const struct scene *scene)
 {
-    float corner_min = INFINITY, corner_max = -INFINITY, near_z, far_z;
-    for (int i = 0; i < 8; i++) {
-        float c[3];
-        light_corner(f, scene, i, c);
-        corner_min = fminf(corner_min, c[2]);
-        corner_max = fmaxf(corner_max, c[2]);
-    }
-    meshlet_range(f, scene, &near_z, &far_z);
-    near_z = fmaxf(near_z, corner_min);
-    far_z = fminf(far_z, corner_max);
-    if (scene_is_empty(scene) || !(far_z > 0))
-        near_z = 0.5f, far_z = 1;
+    float range[2];
+    geometry_range(f, scene, range);
+    if (!(range[1] > 0))
+        range[0] = 0.5f, range[1] = 1;
+    f->far_z = range[1] * 1.001f + 1e-6f;
     /* Nearer casters are kept by depth clamping, at the near plane's depth. */
-    f->far_z = far_z * 1.001f + 1e-6f;
     float least = f->parallel ? -INFINITY : fmaxf(f->far_z * 1e-3f, 1e-5f);
-    f->near_z = fminf(fmaxf(near_z * (near_z > 0 ? 0.999f : 1.001f), least), 0.999f * f->far_z);
+    f->near_z = fminf(
+        fmaxf(range[0] * (range[0] > 0 ? 0.999f : 1.001f), least), 0.999f * f->far_z);
 }
 
-void light_face_window(const struct light_face *f, const struct scene *scene,
-    const float sample[2], float rect[4])
+void light_face_window(
+    const struct light_face *f, const float casters[2][3], const float sample[2], float rect[4])
 {
     float n = f->near_z;
     rect[0] = rect[1] = INFINITY;
     rect[2] = rect[3] = -INFINITY;
     float corners[8][3];
     for (int i = 0; i < 8; i++)
-        light_corner(f, scene, i, corners[i]);
+        light_corner(f, casters, i, corners[i]);
     for (int i = 0; i < 8; i++)
         for (int axis = 0; axis < 3; axis++) {
             /* Every edge once, clipped to z >= n, both ends projected. */
@@ -187,11 +255,11 @@ void light_face_cull(const struct light_face *f, const float sample[2], const fl
     cull->cull_back = true;
 }
 
-static void fit_face(struct light_face *f, const struct scene *scene)
+static void fit_face(struct light_face *f, const struct light *light, const struct scene *scene)
 {
     static const float center[2] = {0, 0};
     fit_range(f, scene);
-    light_face_window(f, scene, center, f->rect);
+    light_face_window(f, light->casters, center, f->rect);
 }
 
 static void init_face(struct light_face *f, const struct pen_light *source)
@@ -259,7 +327,7 @@ static void make_cube(struct light *light, const struct scene *scene)
         f->cube = 1;
         make_axes(axes[i][0], axes[i][1], x, y, z);
         set_axes(f, light->source->position, x, y, z);
-        fit_face(f, scene);
+        fit_face(f, light, scene);
     }
 }
 
@@ -279,6 +347,7 @@ static void make_light(struct light *light, const struct pen_light *source, cons
         float distance = glm_vec3_norm(direction);
         if (distance * sinf(glm_rad(65)) < radius) {
             make_axes((float[]){0, -1, 0}, (float[]){0, 0, 1}, light->x, light->y, light->z);
+            caster_bounds(scene, light, light->casters);
             make_cube(light, scene);
             return;
         }
@@ -287,10 +356,11 @@ static void make_light(struct light *light, const struct pen_light *source, cons
     if (source->type == PEN_LIGHT_SUN)
         for (int i = 0; i < 3; i++)
             light->origin[i] = center[i] - light->z[i] * 2 * radius;
+    caster_bounds(scene, light, light->casters);
     light->face_count = 1;
     init_face(&light->faces[0], source);
     set_axes(&light->faces[0], light->origin, light->x, light->y, light->z);
-    fit_face(&light->faces[0], scene);
+    fit_face(&light->faces[0], light, scene);
 }
 
 /* One rectangle above and beside the bounds, of a power that lights their centre with about

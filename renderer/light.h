@@ -29,6 +29,7 @@ struct light {
     const struct pen_light *source;
     struct light_face faces[6];
     uint32_t face_count;
+    float casters[2][3]; /* world bounds of what can cast a shadow in this light */
     /* For shading, world space: */
     float radiance[3];  /* emitted; point, spot: intensity, W sr^-1; sun: irradiance */
     float origin[3], x[3], y[3], z[3];
@@ -44,9 +45,12 @@ uint32_t lights_resolve(struct light lights[PEN_MAX_LIGHTS], struct pen_request 
 void light_face_clip(
     const struct light_face *face, const float sample[2], const float rect[4], mat4 light_to_clip);
 
-/* The window of the plane z = near_z through which `sample` sees all casters. */
-void light_face_window(const struct light_face *face, const struct scene *scene,
-    const float sample[2], float rect[4]);
+/* The window of the plane z = near_z through which `sample` sees all of `casters`. */
+void light_face_window(
+    const struct light_face *face, const float casters[2][3], const float sample[2], float rect[4]);
+
+/* Marks the instances that cannot cast in this light: flat and on the far border of the bounds. */
+void light_find_backdrops(const struct light *light, const struct scene *scene, bool *backdrop);
 
 /* What a depth pass of this face culls with. */
 void light_face_cull(const struct light_face *face, const float sample[2], const float rect[4],

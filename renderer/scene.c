@@ -344,9 +344,12 @@ uint64_t scene_draw(struct scene *s, const struct cull_view *view, const struct 
         abort();
     for (uint32_t g = 0; g < s->group_count; g++) {
         runs[g].first = total;
-        for (uint32_t i = 0; i < s->groups[g].count; i++)
-            triangles += cull_instance(view, &s->blob, s->order[s->groups[g].first + i],
-                s->groups[g].double_sided, s->command_room, &total);
+        for (uint32_t i = 0; i < s->groups[g].count; i++) {
+            uint32_t instance = s->order[s->groups[g].first + i];
+            if (!pass->hidden || !pass->hidden[instance])
+                triangles += cull_instance(view, &s->blob, instance, s->groups[g].double_sided,
+                    s->command_room, &total);
+        }
         runs[g].count = total - runs[g].first;
     }
     if (!total)

@@ -48,6 +48,7 @@ struct scene_pass {
     GLuint opaque, textured;
     bool full; /* draws with all attributes and textures; else positions only where it can */
     bool front_is_clockwise; /* the target's y axis is flipped */
+    const bool *hidden; /* instances to leave out, or NULL */
 };
 /* Returns the triangles drawn. The caller has bound framebuffer, viewport and depth state. */
 uint64_t scene_draw(

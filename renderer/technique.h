@@ -79,5 +79,6 @@ enum {
     UNIT_EMITTED,   /* gbuffer.emission */
     UNIT_EMISSION,  /* emission texture of the light */
     UNIT_SHADOW,    /* the method's depth map, nearest, border 1 */
-    UNIT_FREE       /* first of eight units that are the method's own */
+    UNIT_FREE,      /* first of seven units that are the method's own */
+    UNIT_MIN_MAX = 14 /* what min_max.glsl reads */
 };

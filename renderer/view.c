@@ -18,16 +18,40 @@ static void make_matrices(struct view *v, float jitter_x, float jitter_y)
     glm_mat4_inv_precise(v->world_to_clip, v->clip_to_world);
 }
 
+/* The least distance from the centre at which all corners of the bounds are in the picture: each
+ * corner asks for its own, by similar triangles. */
+static float framing_distance(const struct scene *scene, const float center[3],
+    const float direction[3], float fov_y_rad, float aspect)
+{
+    float right[3], up[3], world_up[3] = {0, 1, 0}, least = 0;
+    glm_vec3_cross(world_up, (float *)direction, right);
+    glm_vec3_normalize(right);
+    glm_vec3_cross((float *)direction, right, up);
+    float tan_y = tanf(0.5f * fov_y_rad), tan_x = tan_y * aspect;
+    for (int i = 0; i < 8; i++) {
+        float d[3];
+        for (int k = 0; k < 3; k++)
+            d[k] = (i >> k & 1 ? scene->blob.header->bounds_max[k]
+                               : scene->blob.header->bounds_min[k]) - center[k];
+        float toward = glm_vec3_dot(d, (float *)direction);
+        least = fmaxf(least, toward + fabsf(glm_vec3_dot(d, right)) / tan_x);
+        least = fmaxf(least, toward + fabsf(glm_vec3_dot(d, up)) / tan_y);
+    }
+    return least;
+}
+
 static void frame_bounds(struct pen_camera *c, const struct scene *scene, float aspect)
 {
-    float center[3], radius = scene_radius(scene);
+    float center[3], distance = c->distance;
     scene_center(scene, center);
-    float fov_y = glm_rad(c->fov_y_deg);
-    float fov = fminf(fov_y, 2 * atanf(tanf(0.5f * fov_y) * aspect));
-    float distance = c->distance > 0 ? c->distance : 1.05f * radius / sinf(0.5f * fov);
     float azimuth = glm_rad(c->azimuth_deg), elevation = glm_rad(c->elevation_deg);
     float direction[3] = {
         sinf(azimuth) * cosf(elevation), sinf(elevation), cosf(azimuth) * cosf(elevation)};
+    if (distance <= 0 && !scene_is_empty(scene))
+        distance = 1.06f *
+            framing_distance(scene, center, direction, glm_rad(c->fov_y_deg), aspect);
+    if (distance <= 0)
+        distance = 3 * scene_radius(scene);
     for (int i = 0; i < 3; i++) {
         c->target[i] = center[i];
         c->eye[i] = center[i] + distance * direction[i];

@@ -72,12 +72,17 @@ static size_t on_header(char *line, size_t one, size_t bytes, void *user)
 {
     (void)one;
     struct cli_answer *answer = ((struct transfer *)user)->answer;
-    char value[64];
+    char value[256];
     if (header_value(line, bytes, "Retry-After", value, sizeof value)) {
         char *end;
         double seconds = strtod(value, &end);
         if (end != value && !*end && seconds >= 0) /* a date is not worth parsing here */
             answer->retry_after_s = seconds;
+    }
+    if (header_value(line, bytes, "X-Penumbra-Warning", value, sizeof value)) {
+        char *longer = cli_format("%s%s\n", answer->warnings ? answer->warnings : "", value);
+        free(answer->warnings);
+        answer->warnings = longer;
     }
     header_value(line, bytes, "Content-Type", answer->type, sizeof answer->type);
     header_value(line, bytes, "Location", answer->location, sizeof answer->location);
@@ -290,7 +295,8 @@ int cli_call(
 void cli_answer_finish(struct cli_answer *answer)
 {
     free(answer->text);
-    answer->text = NULL;
+    free(answer->warnings);
+    answer->text = answer->warnings = NULL;
 }
 
 cJSON *cli_answer_object(const struct cli_answer *answer)

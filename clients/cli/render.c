@@ -146,6 +146,9 @@ static int save(const struct cli_server *server, struct cli_call *call, const ch
         status = cli_fail(CLI_FAILED, "%s cannot be written.", path);
     if (status != CLI_OK && sink && !to_stdout)
         unlink(part);
+    for (char *at = answer.warnings, *line; status == CLI_OK && (line = strsep(&at, "\n"));)
+        if (*line)
+            fprintf(stderr, "warning: %s\n", line);
     if (status == CLI_OK && server->verbose)
         fprintf(stderr, "%s: %zu bytes; %s\n", path, answer.bytes, answer.timing);
     cli_answer_finish(&answer);

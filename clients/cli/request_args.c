@@ -235,7 +235,7 @@ bool cli_request_has(const cJSON *root, const char *group, const char *key)
 
 static void print_row(const struct row_set *set, const struct pen_param *row)
 {
-    char name[64], usage[96], range[160] = "";
+    char name[64], usage[160], range[160] = "";
     flag_name(set, row, name);
     if (row->type == PEN_PARAM_FLAG)
         snprintf(usage, sizeof usage, "--%s, --no-%s", name, name);

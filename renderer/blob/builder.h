@@ -5,7 +5,8 @@
 
 struct psc_builder;
 
-struct psc_builder *psc_builder_create(void); /* aborts on out of memory, like all allocation here */
+struct psc_builder *psc_builder_create(
+    void); /* aborts on out of memory, like all allocation here */
 void psc_builder_destroy(struct psc_builder *builder);
 
 struct psc_mesh {
@@ -30,8 +31,8 @@ struct psc_mesh {
 uint32_t psc_builder_add_material(struct psc_builder *builder, const struct psc_material *material);
 uint32_t psc_builder_add_texture(struct psc_builder *builder, const struct psc_texture *texture);
 /* RGBA8, top row first; the mip chain is made here (box filter, in linear light when srgb). */
-uint32_t psc_builder_add_image(struct psc_builder *builder, uint32_t width, uint32_t height,
-    bool srgb, const uint8_t *rgba);
+uint32_t psc_builder_add_image(
+    struct psc_builder *builder, uint32_t width, uint32_t height, bool srgb, const uint8_t *rgba);
 uint32_t psc_builder_add_light(struct psc_builder *builder, const struct psc_light *light);
 uint32_t psc_builder_add_camera(struct psc_builder *builder, const struct psc_camera *camera);
 void psc_builder_add_warning(struct psc_builder *builder, const char *format, ...)
@@ -50,5 +51,5 @@ void psc_builder_add_instance(
 struct psc_material psc_material_default(void);
 
 /* The finished file. The caller frees *data. */
-bool psc_builder_finish(struct psc_builder *builder, const uint8_t source[PEN_ID_BYTES], void **data,
-    size_t *bytes, struct pen_error *error);
+bool psc_builder_finish(struct psc_builder *builder, const uint8_t source[PEN_ID_BYTES],
+    void **data, size_t *bytes, struct pen_error *error);

@@ -1,5 +1,6 @@
 #include "renderer/blob/geometry.h"
 #include <math.h>
+#include <pthread.h>
 #include <stdlib.h>
 
 #define STEPS 65536 /* of linear light: finer than an 8-bit sRGB step everywhere */
@@ -61,8 +62,8 @@ static void halve(const uint8_t *from, uint32_t width, uint32_t height, uint8_t 
 
 void psc_make_mips(uint8_t *texels, uint32_t width, uint32_t height, bool srgb)
 {
-    if (!srgb_of[STEPS - 1])
-        make_tables();
+    static pthread_once_t once = PTHREAD_ONCE_INIT; /* builders of several threads share them */
+    pthread_once(&once, make_tables);
     while (width > 1 || height > 1) {
         uint32_t w = width > 1 ? width / 2 : 1, h = height > 1 ? height / 2 : 1;
         uint8_t *next = texels + 4 * (size_t)width * height;

@@ -57,9 +57,9 @@ struct psc_attributes {
 struct psc_meshlet {
     uint32_t first_index, index_count;
     float center[3], radius; /* bounding sphere, object space */
-    float cone_axis[3];      /* normal cone: every triangle faces away from the direction v (unit, */
-    float cone_cutoff;       /* eye to centre) when dot(v, axis) >= cutoff; cutoff > 1: never.
-                                For a perspective eye add radius/distance to cutoff. */
+    float cone_axis[3]; /* normal cone: every triangle faces away from the direction v (unit, */
+    float cone_cutoff;  /* eye to centre) when dot(v, axis) >= cutoff; cutoff > 1: never.
+                           For a perspective eye add radius/distance to cutoff. */
 };
 
 enum psc_primitive_flags { PSC_WATERTIGHT = 1 }; /* every edge is shared by exactly two triangles */
@@ -97,8 +97,8 @@ struct psc_image {
 };
 
 struct psc_texture_ref {
-    int32_t texture; /* -1: none */
-    uint32_t uv_set; /* 0 or 1 */
+    int32_t texture;    /* -1: none */
+    uint32_t uv_set;    /* 0 or 1 */
     float transform[6]; /* row-major 2x3: uv' = T * (uv, 1), from KHR_texture_transform */
 };
 
@@ -113,7 +113,7 @@ struct psc_material {
     float base_color[4]; /* linear; specular-glossiness: diffuse */
     float emissive[3];   /* linear, W m^-2 sr^-1, strength folded in */
     float metallic, roughness;
-    float specular[3];   /* specular-glossiness: F0 factor */
+    float specular[3]; /* specular-glossiness: F0 factor */
     float glossiness;
     float normal_scale, occlusion_strength, alpha_cutoff;
     uint32_t alpha_mode; /* enum psc_alpha_mode */
@@ -160,6 +160,7 @@ struct psc_scene {
  * chains. Errors: PEN_UNPROCESSABLE; *scene is then zeroed. */
 bool psc_open(int fd, struct psc_scene *scene, struct pen_error *error);
 /* The same over memory that outlives *scene. */
-bool psc_open_memory(const void *data, size_t bytes, struct psc_scene *scene, struct pen_error *error);
+bool psc_open_memory(
+    const void *data, size_t bytes, struct psc_scene *scene, struct pen_error *error);
 /* Unmaps what psc_open mapped; harmless on a zeroed or psc_open_memory scene. */
 void psc_close(struct psc_scene *scene);

@@ -1,21 +1,28 @@
 /* The smallest PNG writer that is still a PNG: stored deflate blocks (RFC 1950, 1951; PNG 1.2). */
 #include "renderer/generate/model.h"
+#include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
 
+static uint32_t crc_table[256];
+
+static void make_crc_table(void)
+{
+    for (uint32_t i = 0; i < 256; i++) {
+        uint32_t c = i;
+        for (int k = 0; k < 8; k++)
+            c = c & 1 ? 0xedb88320u ^ c >> 1 : c >> 1;
+        crc_table[i] = c;
+    }
+}
+
 static uint32_t crc32_of(const uint8_t *bytes, uint64_t count)
 {
-    static uint32_t table[256];
-    if (!table[1])
-        for (uint32_t i = 0; i < 256; i++) {
-            uint32_t c = i;
-            for (int k = 0; k < 8; k++)
-                c = c & 1 ? 0xedb88320u ^ c >> 1 : c >> 1;
-            table[i] = c;
-        }
+    static pthread_once_t once = PTHREAD_ONCE_INIT;
+    pthread_once(&once, make_crc_table);
     uint32_t crc = ~0u;
     for (uint64_t i = 0; i < count; i++)
-        crc = table[(crc ^ bytes[i]) & 255] ^ crc >> 8;
+        crc = crc_table[(crc ^ bytes[i]) & 255] ^ crc >> 8;
     return ~crc;
 }
 

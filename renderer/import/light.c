@@ -22,16 +22,15 @@ static double degrees(double radians)
     return radians * 180 / M_PI;
 }
 
-/* The flux of a point that sends `candela` everywhere. A spot gets the same: its cones only cut, as
- * in the extension, so that inside the inner cone it lights like the point. */
-static float point_power(double candela)
+/* The flux of `candela` over a solid angle. */
+static float flux(double candela, double steradians)
 {
-    return (float)clamp(4 * M_PI * candela / LUMENS_PER_WATT, 0, 1e9);
+    return (float)clamp(candela / LUMENS_PER_WATT * steradians, 0, 1e9);
 }
 
 static bool fill(struct pen_light *to, const struct gltf_light *from, double scale)
 {
-    double intensity = from->intensity;
+    double intensity = from->intensity, mean;
     switch (from->type) {
     case GLTF_LIGHT_DIRECTIONAL:
         pen_light_default(to, PEN_LIGHT_SUN);
@@ -39,13 +38,17 @@ static bool fill(struct pen_light *to, const struct gltf_light *from, double sca
         return true;
     case GLTF_LIGHT_POINT:
         pen_light_default(to, PEN_LIGHT_POINT);
-        to->power_w = point_power(intensity);
+        to->power_w = flux(intensity, 4 * M_PI);
         return true;
     case GLTF_LIGHT_SPOT:
         pen_light_default(to, PEN_LIGHT_SPOT);
-        to->power_w = point_power(intensity);
         to->outer_cone_deg = (float)clamp(degrees(from->outer_cone), 0.01, 89);
         to->inner_cone_deg = (float)clamp(degrees(from->inner_cone), 0, 0.999 * to->outer_cone_deg);
+        /* The renderer takes a spot's power as the flux inside its cone, full up to the inner angle
+         * and falling evenly in the cosine to the outer one; the extension gives the intensity on
+         * the axis, which is what this gets back. */
+        mean = (cos(to->inner_cone_deg * M_PI / 180) + cos(to->outer_cone_deg * M_PI / 180)) / 2;
+        to->power_w = flux(intensity, 2 * M_PI * (1 - mean));
         return true;
     case GLTF_LIGHT_RECT:
     case GLTF_LIGHT_DISK:

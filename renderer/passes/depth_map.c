@@ -1,5 +1,6 @@
 #include "renderer/passes/passes.h"
 #include <cglm/cglm.h>
+#include <stdlib.h>
 #include <string.h>
 
 static GLuint program(struct technique_ctx *ctx, const char *defines, struct pen_error *error)
@@ -10,7 +11,7 @@ static GLuint program(struct technique_ctx *ctx, const char *defines, struct pen
 }
 
 bool pass_draw_casters(struct technique_run *run, GLuint framebuffer, uint32_t size,
-    const float sample[2], const float rect[4], struct pen_error *error)
+    const float sample[2], const float rect[4], bool backdrops, struct pen_error *error)
 {
     /* Light space looks along +z, which mirrors the image: front faces come out clockwise. */
     struct scene_pass pass = {.front_is_clockwise = true};
@@ -38,7 +39,16 @@ bool pass_draw_casters(struct technique_run *run, GLuint framebuffer, uint32_t s
     gl.Enable(GL_DEPTH_TEST);
     gl.DepthFunc(GL_LESS);
     gl.Enable(GL_DEPTH_CLAMP); /* casters nearer than the near plane still cast */
+    bool *hidden = NULL;
+    if (!backdrops) {
+        hidden = calloc(run->scene->blob.instance_count + 1, sizeof *hidden);
+        if (!hidden)
+            abort();
+        light_find_backdrops(run->light, run->scene, hidden);
+        pass.hidden = hidden;
+    }
     scene_draw(run->scene, &cull, &pass);
+    free(hidden);
     gl.Disable(GL_DEPTH_CLAMP);
     gl.Disable(GL_DEPTH_TEST);
     gl.ClipControl(GL_UPPER_LEFT, GL_ZERO_TO_ONE);
@@ -52,7 +62,8 @@ static bool build_depth(struct technique_run *run, const struct shadow_key *key,
     gl_timer_begin(&run->ctx->timer, PEN_STAGE_SHADOW, "shadow map");
     input->textures[0] = gl_texture_create(GL_DEPTH_COMPONENT32F, key->size, key->size, 0, 1);
     GLuint framebuffer = gl_framebuffer_create(NULL, 0, &input->textures[0]);
-    bool ok = pass_draw_casters(run, framebuffer, key->size, center, run->face->rect, error);
+    bool ok = pass_draw_casters(run, framebuffer, key->size, center, run->face->rect,
+        key->extra[0] == 0, error);
     gl.DeleteFramebuffers(1, &framebuffer);
     gl_timer_end(&run->ctx->timer);
     return ok;
@@ -62,5 +73,12 @@ const struct shadow_input *pass_depth_map(
     struct technique_run *run, uint32_t size, struct pen_error *error)
 {
     struct shadow_key key = {.kind = "depth", .size = size};
+    return shadow_cache_get(run, &key, build_depth, error);
+}
+
+const struct shadow_input *pass_caster_map(
+    struct technique_run *run, uint32_t size, struct pen_error *error)
+{
+    struct shadow_key key = {.kind = "depth", .size = size, .extra = {1}};
     return shadow_cache_get(run, &key, build_depth, error);
 }

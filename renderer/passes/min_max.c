@@ -4,7 +4,8 @@
 static bool build(struct technique_run *run, const struct shadow_key *key,
     struct shadow_input *input, struct pen_error *error)
 {
-    const struct shadow_input *map = pass_depth_map(run, key->size, error);
+    const struct shadow_input *map = key->extra[0] ? pass_caster_map(run, key->size, error)
+                                                   : pass_depth_map(run, key->size, error);
     if (!map)
         return false;
     uint32_t side = key->size > 1 ? key->size / 2 : 1;
@@ -42,5 +43,12 @@ const struct shadow_input *pass_min_max(
     struct technique_run *run, uint32_t size, struct pen_error *error)
 {
     struct shadow_key key = {.kind = "min-max", .size = size};
+    return shadow_cache_get(run, &key, build, error);
+}
+
+const struct shadow_input *pass_caster_min_max(
+    struct technique_run *run, uint32_t size, struct pen_error *error)
+{
+    struct shadow_key key = {.kind = "min-max", .size = size, .extra = {1}};
     return shadow_cache_get(run, &key, build, error);
 }

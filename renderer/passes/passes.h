@@ -50,13 +50,21 @@ bool pass_fill(
 const struct shadow_input *pass_depth_map(
     struct technique_run *run, uint32_t size, struct pen_error *error);
 
+/* The same without backdrops (light_find_backdrops): for methods that compare depths, where what
+ * cannot cast only costs time and bias. Methods that filter depths want pass_depth_map. */
+const struct shadow_input *pass_caster_map(
+    struct technique_run *run, uint32_t size, struct pen_error *error);
+
 /* Draws the casters seen from `sample` through `rect` into a D32F framebuffer (cleared here). */
 bool pass_draw_casters(struct technique_run *run, GLuint framebuffer, uint32_t size,
-    const float sample[2], const float rect[4], struct pen_error *error);
+    const float sample[2], const float rect[4], bool backdrops, struct pen_error *error);
 
 /* Min and max of linear z (metres from the light's plane; cleared texels: far_z) over 2^k x 2^k
  * texels: RG32F with the whole mip chain in textures[0]; level 0 has half the map's side. */
 const struct shadow_input *pass_min_max(
+    struct technique_run *run, uint32_t size, struct pen_error *error);
+/* The same over pass_caster_map. */
+const struct shadow_input *pass_caster_min_max(
     struct technique_run *run, uint32_t size, struct pen_error *error);
 
 /* The G-buffer of the frame. */

@@ -44,10 +44,10 @@ static bool draw_layers(struct technique_run *run, const struct sample_point *po
     gl.CreateFramebuffers(1, &framebuffer);
     for (uint32_t i = 0; ok && i < count; i++) {
         float rect[4];
-        light_face_window(run->face, run->scene, points[i].at, rect);
+        light_face_window(run->face, run->light->casters, points[i].at, rect);
         gl.NamedFramebufferTextureLayer(
             framebuffer, GL_DEPTH_ATTACHMENT, array->name, 0, (GLint)i);
-        ok = pass_draw_casters(run, framebuffer, array->width, points[i].at, rect, error);
+        ok = pass_draw_casters(run, framebuffer, array->width, points[i].at, rect, false, error);
     }
     gl.DeleteFramebuffers(1, &framebuffer);
     gl_timer_end(&run->ctx->timer);
@@ -77,7 +77,7 @@ bool pass_sample_maps(struct technique_run *run, const struct sample_point *poin
     memset(table, 0, count * sizeof *table);
     for (uint32_t i = 0; i < count; i++) {
         float rect[4];
-        light_face_window(run->face, run->scene, points[i].at, rect);
+        light_face_window(run->face, run->light->casters, points[i].at, rect);
         for (int k = 0; k < 2; k++) {
             table[i].at[k] = points[i].at[k];
             table[i].at[2 + k] = points[i].uv[k];

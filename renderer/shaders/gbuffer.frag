@@ -69,7 +69,7 @@ void main()
     if (alpha_is_cut(v_material, base.a, threshold))
         discard;
     if (material_has(v_material, SURFACE)) {
-        vec4 t = texture(surface_map, material_uv(v_material, SURFACE, v_uv));
+        vec4 t = material_sample(surface_map, v_material, SURFACE, v_uv);
         metallic *= t.b;
         roughness *= t.g;
         f0 *= t.rgb;
@@ -77,11 +77,11 @@ void main()
     }
     if (material_has(v_material, OCCLUSION))
         occlusion = 1.0 + m.surface.z *
-            (texture(occlusion_map, material_uv(v_material, OCCLUSION, v_uv)).r - 1.0);
+            (material_sample(occlusion_map, v_material, OCCLUSION, v_uv).r - 1.0);
     if (material_has(v_material, EMISSION))
-        emission *= texture(emission_map, material_uv(v_material, EMISSION, v_uv)).rgb;
+        emission *= material_sample(emission_map, v_material, EMISSION, v_uv).rgb;
     if (material_has(v_material, NORMAL) && dot(v_tangent.xyz, v_tangent.xyz) > 0.0) {
-        vec3 t = texture(normal_map, material_uv(v_material, NORMAL, v_uv)).xyz * 2.0 - 1.0;
+        vec3 t = material_sample(normal_map, v_material, NORMAL, v_uv).xyz * 2.0 - 1.0;
         t.xy *= m.surface.w;
         vec3 tangent = normalize(v_tangent.xyz - shading * dot(v_tangent.xyz, shading));
         vec3 bitangent = cross(shading, tangent) * v_tangent.w;

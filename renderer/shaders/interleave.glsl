@@ -20,7 +20,15 @@ vec4 visibility(Surface s)
         gradient(depth_at(s.pixel - ivec2(0, 1)), s.depth, depth_at(s.pixel + ivec2(0, 1))));
     float sum = 0.0, weight = 0.0, widest = center.g;
     ivec2 last = ivec2(view.viewport.xy) - 1;
-    for (int i = 0; i < 16; i++) {
+    // Where the block's corners agree and nothing is in penumbra there is nothing to average.
+    float spread = center.g;
+    for (int i = 0; i < 4; i++) {
+        ivec2 corner = s.pixel + ivec2((i & 1) * 3, (i >> 1) * 3) - 2;
+        vec2 v = texelFetch(interleaved, clamp(corner, ivec2(0), last), 0).rg;
+        spread = max(spread, max(v.g, abs(v.r - center.r)));
+    }
+    int count = spread > 0.0 ? 16 : 0;
+    for (int i = 0; i < count; i++) {
         ivec2 offset = ivec2(i & 3, i >> 2) - 2;
         ivec2 at = clamp(s.pixel + offset, ivec2(0), last);
         vec2 v = texelFetch(interleaved, at, 0).rg;

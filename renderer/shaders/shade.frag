@@ -48,91 +48,124 @@ vec3 specular_brdf(Material m, vec3 n, vec3 v, vec3 l, float spread)
     return (m.f0 + (1.0 - m.f0) * f) * d * smith;
 }
 
+#if defined(HAS_RECT) || defined(HAS_ROUND)
 // Quadrature of the specular part over the emitter: k x k cells, fewer for rough surfaces.
 vec3 specular_area(Material m, ShadeLight s, vec3 p, vec3 n, vec3 v)
 {
     int type = int(s.origin.w), k = m.alpha > 0.25 ? 2 : 4;
     vec3 half_x = s.half_x.xyz, half_y = s.half_y.xyz, axis = s.z.xyz;
+#ifdef HAS_ROUND
     if (type == SPHERE) { // the disk that faces the receiver
         axis = normalize(p - s.origin.xyz);
         vec3 up = abs(axis.y) < 0.9 ? vec3(0.0, 1.0, 0.0) : vec3(1.0, 0.0, 0.0);
         half_x = normalize(cross(up, axis)) * s.half_x.w;
         half_y = cross(axis, half_x);
     }
+#endif
     float cell = (type == RECT ? 4.0 : 3.14159265) * length(half_x) * length(half_y) / float(k * k);
     vec3 sum = vec3(0.0);
-    for (int i = 0; i < k * k; i++) {
+    int count = m.f0 == vec3(0.0) ? 0 : k * k;
+    for (int i = 0; i < count; i++) {
         vec2 u = (vec2(i % k, i / k) + 0.5) * (2.0 / float(k)) - 1.0;
+#ifdef HAS_ROUND
         if (type != RECT) { // concentric map of Shirley and Chiu
             bool wide = abs(u.x) > abs(u.y);
             float r = wide ? u.x : u.y;
             float t = 0.78539816 * (wide ? u.y / u.x : (r == 0.0 ? 0.0 : 2.0 - u.x / u.y));
             u = r * vec2(cos(t), sin(t));
         }
+#endif
         vec3 to = s.origin.xyz + u.x * half_x + u.y * half_y - p;
         float d2 = dot(to, to);
         vec3 l = to * inversesqrt(d2);
         float g = max(dot(n, l), 0.0) * max(-dot(axis, l), 0.0) / d2 * cell;
-        if (g > 0.0)
-            sum += specular_brdf(m, n, v, l, min(0.25 * sqrt(cell / d2), 0.5)) * g;
+        sum += specular_brdf(m, n, v, l, min(0.25 * sqrt(cell / d2), 0.5)) * g;
     }
     return sum;
 }
 
-vec3 reflected(Material m, ShadeLight s, vec3 p, vec3 n, vec3 v)
+vec3 reflected_area(Material m, ShadeLight s, vec3 p, vec3 n, vec3 v)
+{
+    int type = int(s.origin.w);
+    float e = 0.0;
+#ifdef HAS_RECT
+    if (type == RECT)
+        e = irradiance_rect(p, n, s.origin.xyz, s.half_x.xyz, s.half_y.xyz);
+#endif
+#ifdef HAS_ROUND
+    if (type == DISK)
+        e = irradiance_disk(p, n, s.origin.xyz, s.half_x.xyz, s.half_y.xyz);
+    if (type == SPHERE)
+        e = irradiance_sphere(p, n, s.origin.xyz, s.half_x.w);
+#endif
+    bool behind = type != SPHERE && dot(s.origin.xyz - p, s.z.xyz) >= 0.0;
+    if (behind || e <= 0.0)
+        return vec3(0.0);
+    return m.diffuse * (e / 3.14159265) + specular_area(m, s, p, n, v);
+}
+#endif
+
+#ifdef HAS_PUNCTUAL
+vec3 reflected_punctual(Material m, ShadeLight s, vec3 p, vec3 n, vec3 v)
 {
     int type = int(s.origin.w);
     vec3 to = s.origin.xyz - p;
-    if (type >= SUN) {
-        vec3 l = type == SUN ? -s.z.xyz : normalize(to);
-        float nl = dot(n, l);
-        if (nl <= 0.0)
-            return vec3(0.0);
-        float e = type == SUN ? nl : nl / dot(to, to);
-        if (type == SPOT)
-            e *= pow(clamp((dot(-l, s.z.xyz) - s.z.w) / max(s.half_y.w - s.z.w, 1e-4), 0.0, 1.0), 2.0);
-        return (m.diffuse * (1.0 / 3.14159265) + specular_brdf(m, n, v, l, 0.0)) * e;
-    }
-    if (type != SPHERE && dot(to, s.z.xyz) >= 0.0)
+    vec3 l = type == SUN ? -s.z.xyz : normalize(to);
+    float nl = dot(n, l);
+    if (nl <= 0.0)
         return vec3(0.0);
-    float e = type == RECT ? irradiance_rect(p, n, s.origin.xyz, s.half_x.xyz, s.half_y.xyz)
-        : type == DISK     ? irradiance_disk(p, n, s.origin.xyz, s.half_x.xyz, s.half_y.xyz)
-                           : irradiance_sphere(p, n, s.origin.xyz, s.half_x.w);
-    if (e <= 0.0)
-        return vec3(0.0);
-    return m.diffuse * (e / 3.14159265) + specular_area(m, s, p, n, v);
+    float e = type == SUN ? nl : nl / dot(to, to);
+    if (type == SPOT)
+        e *= pow(clamp((dot(-l, s.z.xyz) - s.z.w) / max(s.half_y.w - s.z.w, 1e-4), 0.0, 1.0), 2.0);
+    return (m.diffuse * (1.0 / 3.14159265) + specular_brdf(m, n, v, l, 0.0)) * e;
+}
+#endif
+
+vec3 reflected(Material m, ShadeLight s, vec3 p, vec3 n, vec3 v)
+{
+#if (defined(HAS_RECT) || defined(HAS_ROUND)) && defined(HAS_PUNCTUAL)
+    return int(s.origin.w) >= SUN ? reflected_punctual(m, s, p, n, v) : reflected_area(m, s, p, n, v);
+#elif defined(HAS_PUNCTUAL)
+    return reflected_punctual(m, s, p, n, v);
+#elif defined(HAS_RECT) || defined(HAS_ROUND)
+    return reflected_area(m, s, p, n, v);
+#else
+    return vec3(0.0);
+#endif
 }
 
 void main()
 {
     ivec2 pixel = ivec2(gl_FragCoord.xy);
     float depth = texelFetch(g_depth, pixel, 0).r;
-    vec3 sum = view.background.rgb;
-    if (depth != 0.0) {
-        vec3 p = unproject(view.clip_to_world, pixel_to_ndc(pixel), depth);
-        vec3 v = normalize(view.eye.xyz - p);
-        vec3 n = octahedral_decode(texelFetch(g_normal, pixel, 0).zw);
-        vec4 albedo = texelFetch(g_albedo, pixel, 0);
-        vec4 surface = texelFetch(g_surface, pixel, 0);
-        albedo.rgb *= albedo.rgb;
-        Material m;
-        m.diffuse = albedo.rgb * (1.0 - surface.g) * (1.0 - 0.08 * surface.a);
-        m.f0 = mix(vec3(0.08 * surface.a), albedo.rgb, surface.g);
-        m.alpha = max(surface.r * surface.r, 0.002);
-        sum = view.ambient.rgb * (m.diffuse + m.f0) * surface.b;
+    bool hit = depth != 0.0;
+    vec3 p = unproject(view.clip_to_world, pixel_to_ndc(pixel), hit ? depth : 1.0);
+    vec3 v = normalize(view.eye.xyz - p);
+    vec3 n = octahedral_decode(texelFetch(g_normal, pixel, 0).zw);
+    vec4 albedo = texelFetch(g_albedo, pixel, 0);
+    vec4 surface = texelFetch(g_surface, pixel, 0);
+    albedo.rgb *= albedo.rgb;
+    Material m;
+    m.diffuse = albedo.rgb * (1.0 - surface.g) * (1.0 - 0.08 * surface.a);
+    m.f0 = mix(vec3(0.08 * surface.a), albedo.rgb, surface.g);
+    m.alpha = max(surface.r * surface.r, 0.002);
+    vec3 sum = view.ambient.rgb * (m.diffuse + m.f0) * surface.b;
 #ifdef EMIT
-        sum += texelFetch(g_emission, pixel, 0).rgb;
+    sum += texelFetch(g_emission, pixel, 0).rgb;
 #endif
-        for (int i = 0; i < shade.count.x; i++) {
-            vec3 t = texelFetch(visibility_maps, ivec3(pixel, i), 0).rgb;
-            if (t != vec3(0.0))
-                sum += t * shade.lights[i].radiance.rgb * reflected(m, shade.lights[i], p, n, v);
-        }
-        if (albedo.a == 0.0) { // the ground fades into the background, so that it has no edge
-            float d = distance(p.xz, view.ground.xz) / view.ground.w;
-            sum = mix(sum, view.background.rgb, smoothstep(0.35, 0.95, d));
-        }
+    for (int i = 0; i < shade.count.x; i++) {
+        vec3 t = texelFetch(visibility_maps, ivec3(pixel, i), 0).rgb;
+        // Not an if: a loop of dynamic length skips shadowed pixels on software rasterisers too.
+        int lit = hit && t != vec3(0.0) ? 1 : 0;
+        for (int k = 0; k < lit; k++)
+            sum += t * shade.lights[i].radiance.rgb * reflected(m, shade.lights[i], p, n, v);
     }
+    if (albedo.a == 0.0) { // the ground fades into the background, so that it has no edge
+        float d = distance(p.xz, view.ground.xz) / view.ground.w;
+        sum = mix(sum, view.background.rgb, smoothstep(0.35, 0.95, d));
+    }
+    if (!hit)
+        sum = view.background.rgb;
 #ifdef RESOLVE
     color = vec4(display_encode(sum), 1.0);
 #else

@@ -23,6 +23,11 @@ Surface surface_at(ivec2 pixel, float depth)
     return s;
 }
 
+vec3 surface_shading_normal(ivec2 pixel)
+{
+    return mat3(light.world_to_light) * octahedral_decode(texelFetch(g_normal, pixel, 0).zw);
+}
+
 // Distance of the pixel's surface along the view axis, m.
 float surface_view_distance(Surface s)
 {

@@ -14,7 +14,7 @@ static const struct pen_param rows[] = {
 static bool record(struct technique_run *run, struct pen_error *error)
 {
     const struct hard *params = run->params;
-    const struct shadow_input *map = pass_depth_map(run, params->map_size, error);
+    const struct shadow_input *map = pass_caster_map(run, params->map_size, error);
     return map &&
         pass_screen(run,
             &(struct pass_screen){

@@ -1,5 +1,4 @@
-// One batch of light samples, added to the sum: rgb = w e V, a = w V; with weighting by G
-// (techniques section 1) white lights keep their weight in b instead, see the resolve pass.
+// One batch of light samples, added to the sum: rgb = w e V (r = w V for a plain light), a = w.
 layout(binding = 7) uniform sampler2DArray maps;
 struct SampleMap {
     vec4 at;     // xy emitter position, zw the same in [-1, 1]^2
@@ -39,17 +38,18 @@ vec4 visibility(Surface s)
         vec2 texel = uv * size, center = floor(texel) + 0.5;
         vec2 offset = (center - texel) / (size * window.xy);
         float plane = min(depth + slope * dot(s.n.xy, offset), 1.0) - bias;
-        float lit = plane <= texture(maps, vec3(uv, float(i))).r && facing > 0.0 ? 1.0 : 0.0;
+        float lit = plane <= texture(maps, vec3(uv, float(i))).r ? 1.0 : 0.0;
+        // Light below the receiver's horizon is left out of the mean: irradiance is clipped there.
 #if P_weighting == 1
         vec3 to = vec3(at, 0.0) - s.p;
         float d2 = dot(to, to);
         float w = light.parallel != 0 ? max(facing, 0.0) : max(facing, 0.0) * s.p.z / (d2 * d2);
+#else
+        float w = facing > 0.0 ? 1.0 : 0.0;
+#endif
         sum += light.textured != 0
             ? vec4(light_emission(lookup.samples[i].at.zw, 0.0) * w * lit, w)
             : vec4(w * lit, 0.0, 0.0, w);
-#else
-        sum += vec4(light_emission(lookup.samples[i].at.zw, 0.0) * lit, lit);
-#endif
     }
     return sum * lookup.weight.x;
 }

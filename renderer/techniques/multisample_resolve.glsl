@@ -3,15 +3,11 @@ layout(binding = 7) uniform sampler2D accumulated;
 vec4 visibility(Surface s)
 {
     vec4 sum = texelFetch(accumulated, s.pixel, 0);
-#if P_weighting == 1
-    // The weights' sum rides in a. A textured light's mean visibility is that of its luminance.
+    // A textured light's mean visibility is that of its luminance: there is no fifth channel.
     sum.rgb /= max(sum.a, 1e-20);
     if (light.textured == 0)
         return scalar_visibility(sum.r);
     const vec3 luminance = vec3(0.2126, 0.7152, 0.0722);
     float mean = max(dot(light.emission_mean.rgb, luminance), 1e-6);
     return vec4(sum.rgb, clamp(dot(sum.rgb, luminance) / mean, 0.0, 1.0));
-#else
-    return sum;
-#endif
 }

@@ -27,11 +27,16 @@ static const struct pen_param rows[] = {
 static bool record(struct technique_run *run, struct pen_error *error)
 {
     const struct pcss *params = run->params;
-    const struct shadow_input *map = pass_depth_map(run, params->map_size, error);
-    if (!map)
+    const struct shadow_input *map = pass_caster_map(run, params->map_size, error);
+    const struct shadow_input *min_max = pass_caster_min_max(run, params->map_size, error);
+    if (!map || !min_max)
         return false;
-    struct pass_screen pass = {
-        .name = "pcss", .body = "pcss.glsl", .shadow = &map->textures[0]};
+    struct pass_texture pyramid = {UNIT_MIN_MAX, min_max->textures[0].name, GL_SAMPLE_NEAREST};
+    struct pass_screen pass = {.name = "pcss",
+        .body = "pcss.glsl",
+        .shadow = &map->textures[0],
+        .textures = &pyramid,
+        .texture_count = 1};
     return params->smooth.on ? pass_interleaved(run, &pass, error) : pass_screen(run, &pass, error);
 }
 

@@ -1,5 +1,6 @@
 // Fernando 2005 with exact projections (F3, F4 of the light frame) and the receiver's plane.
 #include "taps.glsl"
+#include "min_max.glsl"
 
 vec4 visibility(Surface s)
 {
@@ -9,10 +10,12 @@ vec4 visibility(Surface s)
     float bias = P(bias) * s.p.z * light_depth_slope(s.p.z);
     vec2 shift = P(smooth) ? frame_shift(s.pixel) : vec2(0.5);
 
-    vec2 search = max(light_search_extent(s.p.z), texel);
+    float nearest_z;
+    vec2 search = min_max_search_extent(q, s.p.z, texel, nearest_z);
+    int search_count = nearest_z < s.p.z ? P(search_taps) : 0;
     Taps taps = taps_begin(P(search_taps), shift);
     float sum = 0.0, blockers = 0.0;
-    for (int i = 0; i < P(search_taps); i++) {
+    for (int i = 0; i < search_count; i++) {
         vec2 offset = taps_next(taps) * search;
         float d = texture(shadow_map, uv + offset * inverse_size).r;
         if (d < plane_depth(plane, offset, bias)) {

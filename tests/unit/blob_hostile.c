@@ -1,6 +1,7 @@
 /* Damaged files: psc_open either refuses or gives a scene whose every offset and number is usable.
  * A reader that walks everything runs after each success; sanitizers see what it touches. */
 #include "tests/unit/blob_shapes.h"
+#include "tests/unit/blob_walk.h"
 
 static void *valid_blob(size_t *bytes)
 {
@@ -33,45 +34,6 @@ static void *valid_blob(size_t *bytes)
     return data;
 }
 
-/* Touches all that the format promises; returns something so that nothing is optimised away. */
-static double walk(const struct psc_scene *s)
-{
-    double sum = 0;
-    for (uint32_t i = 0; i < s->instance_count; i++) {
-        const struct psc_primitive *p = &s->primitives[s->instances[i].primitive];
-        for (uint32_t m = 0; m < p->meshlet_count; m++) {
-            const struct psc_meshlet *let = &s->meshlets[p->first_meshlet + m];
-            for (uint32_t k = 0; k < let->index_count; k++) {
-                uint32_t v = s->indices[let->first_index + k];
-                CHECK(v - p->first_vertex < p->vertex_count);
-                sum += s->positions[v][2] + s->attributes[v].uv[0][1] * 1e-30;
-                CHECK(isfinite(s->positions[v][0]) && isfinite(s->attributes[v].uv[1][1]));
-            }
-        }
-        const struct psc_material *m = &s->materials[p->material];
-        if (m->base.texture >= 0) {
-            const struct psc_image *image = &s->images[s->textures[m->base.texture].image];
-            uint64_t at = image->first_byte;
-            uint32_t w = image->width, h = image->height;
-            for (uint32_t l = 0; l < image->levels; l++) {
-                sum += s->texels[at + 4 * ((uint64_t)w * h - 1)];
-                at += 4ull * w * h;
-                w = w > 1 ? w / 2 : 1;
-                h = h > 1 ? h / 2 : 1;
-            }
-            CHECK(at <= s->texel_bytes);
-        }
-        CHECK(isfinite(m->roughness) && m->alpha_mode <= PSC_BLEND);
-    }
-    for (uint32_t i = 0; i < s->light_count; i++)
-        sum += (double)strlen(s->lights[i].name) + s->lights[i].light.type;
-    for (uint32_t i = 0; i < s->camera_count; i++)
-        sum += (double)strlen(s->cameras[i].name);
-    for (const char *w = s->warnings; w < s->warnings + s->warning_bytes; w += strlen(w) + 1)
-        sum += *w;
-    return sum;
-}
-
 static double total;
 
 /* A fresh allocation of exactly `bytes`, so that a sanitizer sees one byte too far. */
@@ -84,7 +46,7 @@ static bool try_blob(const void *blob, size_t bytes)
     bool ok = psc_open_memory(copy, bytes, &s, &error);
     CHECK(ok || (error.code == PEN_UNPROCESSABLE && error.message[0] && !s.header));
     if (ok)
-        total += walk(&s);
+        CHECK(walk_blob(&s, &total));
     free(copy);
     return ok;
 }

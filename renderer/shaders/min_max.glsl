@@ -1,0 +1,34 @@
+// The min-max pyramid of linear depth (passes/min_max.c): bounds over windows of the map.
+layout(binding = 14) uniform sampler2D min_max_pyramid; // r min, g max, z in m
+
+// Bounds of the map's linear depth over the window q +- extent (m on the map plane), from at most
+// 2 x 2 texels of the level that is coarse enough. Outside the map nothing occludes: far_z.
+vec2 min_max_window(vec2 q, vec2 extent)
+{
+    vec2 size = vec2(textureSize(min_max_pyramid, 0));
+    vec2 low = clamp(light_uv(q - extent), 0.0, 1.0), high = clamp(light_uv(q + extent), 0.0, 1.0);
+    vec2 span = (high - low) * size;
+    int level = int(ceil(log2(max(max(span.x, span.y), 1.0))));
+    ivec2 last = max(ivec2(size) >> level, ivec2(1)) - 1;
+    vec2 scale = size * exp2(-float(level));
+    ivec2 a = clamp(ivec2(low * scale), ivec2(0), last), b = clamp(ivec2(high * scale), ivec2(0), last);
+    vec2 v0 = texelFetch(min_max_pyramid, a, level).rg;
+    vec2 v1 = texelFetch(min_max_pyramid, ivec2(b.x, a.y), level).rg;
+    vec2 v2 = texelFetch(min_max_pyramid, ivec2(a.x, b.y), level).rg;
+    vec2 v3 = texelFetch(min_max_pyramid, b, level).rg;
+    return vec2(min(min(v0.x, v1.x), min(v2.x, v3.x)), max(max(v0.y, v1.y), max(v2.y, v3.y)));
+}
+
+// The half extent within which every blocker of the receiver lies: F4 starts from the near plane,
+// and the nearest depth inside a window shrinks it (F3). Two rounds; never less than `least`.
+// nearest_z: the nearest depth inside the result; when it is behind the receiver nothing blocks.
+vec2 min_max_search_extent(vec2 q, float receiver_z, vec2 least, out float nearest_z)
+{
+    vec2 extent = max(light_search_extent(receiver_z), least);
+    for (int i = 0; i < 2; i++) {
+        nearest_z = min_max_window(q, extent).x;
+        float z = min(nearest_z, receiver_z);
+        extent = max(min(extent, light_filter_extent(z, receiver_z)), least);
+    }
+    return extent;
+}

@@ -1,0 +1,1 @@
+penumbra_fuzz_test(pscene fuzz_pscene.c LIBS penumbra_generate)

@@ -1,0 +1,9 @@
+# The client against a stub of the server: command lines in, calls and exit codes out.
+if(PENUMBRA_DAEMON)
+    find_package(Python3 COMPONENTS Interpreter)
+    if(Python3_FOUND)
+        add_test(NAME api.cli COMMAND ${Python3_EXECUTABLE}
+            ${CMAKE_SOURCE_DIR}/tests/api/test_cli.py $<TARGET_FILE:penumbra>)
+        set_tests_properties(api.cli PROPERTIES LABELS api TIMEOUT 120)
+    endif()
+endif()

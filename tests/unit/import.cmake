@@ -1,0 +1,10 @@
+if(TARGET penumbra_import)
+    find_package(meshoptimizer REQUIRED)
+    pkg_check_modules(import_test REQUIRED IMPORTED_TARGET spng libturbojpeg libwebp libzip)
+    add_library(test_import_support STATIC import_support.c)
+    target_link_libraries(test_import_support PUBLIC penumbra_import penumbra_blob
+        PkgConfig::import_test meshoptimizer::meshoptimizer)
+    foreach(part accessor mesh node material files)
+        penumbra_unit_test(import_${part} import_${part}.c LIBS test_import_support)
+    endforeach()
+endif()

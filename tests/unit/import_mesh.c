@@ -1,0 +1,222 @@
+/* Primitive modes, winding, attributes, shared vertex buffers, welding and meshlets. */
+#include "tests/unit/import_support.h"
+
+#define HEAD                                                                                       \
+    "{\"asset\":{\"version\":\"2.0\"},\"scene\":0,\"scenes\":[{\"nodes\":[0]}],"                   \
+    "\"nodes\":[{\"mesh\":0}],"
+
+/* Five points p0 .. p4 of a zigzag, drawn unindexed in one mode. */
+static struct imported zigzag(int mode)
+{
+    const float p[5][3] = {{0, 0, 0}, {0, 1, 0}, {1, 0, 0}, {1, 1, 0}, {2, 0, 0}};
+    char *json = text(HEAD
+        "\"meshes\":[{\"primitives\":[{\"mode\":%d,\"attributes\":{\"POSITION\":0}}]}],"
+        "\"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":5,\"type\":\"VEC3\"}],"
+        "\"bufferViews\":[{\"buffer\":0,\"byteLength\":60}],"
+        "\"buffers\":[{\"byteLength\":60,\"uri\":\"data:;base64,%s\"}]}",
+        mode, base64(p, sizeof p));
+    struct imported r = import_json(json);
+    free(json);
+    return r;
+}
+
+static void modes(void)
+{
+    struct imported r = zigzag(4); /* the two points left over make no triangle */
+    CHECK(r.ok && r.scene.header->triangles == 1);
+    CHECK(r.ok && draws(&r.scene, V(0, 0, 0), V(0, 1, 0), V(1, 0, 0)));
+    imported_free(&r);
+
+    r = zigzag(5); /* every other triangle turned, so that all face the same way */
+    CHECK(r.ok && r.scene.header->triangles == 3);
+    CHECK(r.ok && draws(&r.scene, V(0, 0, 0), V(0, 1, 0), V(1, 0, 0)));
+    CHECK(r.ok && draws(&r.scene, V(0, 1, 0), V(1, 1, 0), V(1, 0, 0)));
+    CHECK(r.ok && draws(&r.scene, V(1, 0, 0), V(1, 1, 0), V(2, 0, 0)));
+    for (uint32_t v = 0; r.ok && v < r.scene.vertex_count; v++) /* flat normals: all the same */
+        CHECK(r.scene.attributes[v].normal[2] == -32767);
+    imported_free(&r);
+
+    r = zigzag(6);
+    CHECK(r.ok && r.scene.header->triangles == 3);
+    CHECK(r.ok && draws(&r.scene, V(0, 0, 0), V(0, 1, 0), V(1, 0, 0)));
+    CHECK(r.ok && draws(&r.scene, V(0, 0, 0), V(1, 0, 0), V(1, 1, 0)));
+    CHECK(r.ok && draws(&r.scene, V(0, 0, 0), V(1, 1, 0), V(2, 0, 0)));
+    imported_free(&r);
+
+    for (int mode = 0; mode < 4; mode++) {
+        r = zigzag(mode);
+        CHECK(r.ok && r.scene.header->triangles == 0 && has_warning(&r.scene, "Points and lines"));
+        imported_free(&r);
+    }
+}
+
+/* One vertex of a triangle with every attribute; colours as vec3 of bytes, uv as normalised shorts.
+ */
+static void attributes(void)
+{
+    struct {
+        float positions[9], normals[9], tangents[12];
+        uint16_t uv0[6];
+        float uv1[6];
+        uint8_t colors[12];
+    } buffer = {.positions = {0, 0, 0, 1, 0, 0, 0, 1, 0},
+        .normals = {0, 0, 1, 0, 0, 2, 0, 0, 0.5f},
+        .tangents = {1, 0, 0, -1, 1, 0, 0, -1, 1, 0, 0, -1},
+        .uv0 = {0, 0, 65535, 13107, 0, 65535},
+        .uv1 = {3, -4, 5, 6, 7, 8},
+        .colors = {255, 0, 51, 0, 0, 255, 0, 0, 1, 2, 3, 0}};
+    char *json = text(HEAD
+        "\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0,\"NORMAL\":1,\"TANGENT\":2,"
+        "\"TEXCOORD_0\":3,\"TEXCOORD_1\":4,\"COLOR_0\":5,\"JOINTS_0\":5}}]}],"
+        "\"accessors\":["
+        "{\"bufferView\":0,\"componentType\":5126,\"count\":3,\"type\":\"VEC3\"},"
+        "{\"bufferView\":0,\"byteOffset\":36,\"componentType\":5126,\"count\":3,\"type\":\"VEC3\"},"
+        "{\"bufferView\":0,\"byteOffset\":72,\"componentType\":5126,\"count\":3,\"type\":\"VEC4\"},"
+        "{\"bufferView\":0,\"byteOffset\":120,\"componentType\":5123,\"normalized\":true,"
+        "\"count\":3,\"type\":\"VEC2\"},"
+        "{\"bufferView\":0,\"byteOffset\":132,\"componentType\":5126,\"count\":3,\"type\":\"VEC2\"}"
+        ","
+        "{\"bufferView\":1,\"componentType\":5121,\"normalized\":true,\"count\":3,"
+        "\"type\":\"VEC3\"}],"
+        "\"bufferViews\":[{\"buffer\":0,\"byteLength\":156},"
+        "{\"buffer\":0,\"byteOffset\":156,\"byteLength\":12,\"byteStride\":4}],"
+        "\"buffers\":[{\"byteLength\":168,\"uri\":\"data:;base64,%s\"}]}",
+        base64(&buffer, sizeof buffer));
+    struct imported r = import_json(json);
+    free(json);
+    CHECK(r.ok);
+    if (r.ok) {
+        uint32_t a = vertex_at(&r.scene, 0, 0, 0), b = vertex_at(&r.scene, 1, 0, 0);
+        const struct psc_attributes *at_a = &r.scene.attributes[a], *at_b = &r.scene.attributes[b];
+        CHECK(at_a->normal[2] == 32767 && at_b->normal[2] == 32767);
+        CHECK(at_a->tangent[0] == 32767 && at_a->tangent[3] == -32767);
+        CHECK_NEAR(at_b->uv[0][0], 1, 1e-6);
+        CHECK_NEAR(at_b->uv[0][1], 0.2, 1e-6);
+        CHECK_NEAR(at_a->uv[1][0], 3, 0);
+        CHECK_NEAR(at_a->uv[1][1], -4, 0);
+        CHECK(at_a->color[0] == 255 && at_a->color[1] == 0 && at_a->color[2] == 51 &&
+              at_a->color[3] == 255);
+        CHECK(at_b->color[1] == 255 && at_b->color[0] == 0);
+    }
+    imported_free(&r);
+}
+
+/* Two primitives share a vertex buffer, each using its own half: each keeps only what it uses, and
+ * three equal vertices become one. */
+static void sharing_and_welding(void)
+{
+    struct {
+        float p[8][3];
+        uint16_t i[2][6];
+    } buffer = {
+        {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 0}, {5, 0, 0}, {6, 0, 0}, {5, 1, 0}, {6, 1, 0}},
+        {{0, 1, 2, 3, 2, 1}, {4, 5, 6, 6, 5, 7}}};
+    const float normals[8][3] = {
+        {0, 0, 1}, {0, 0, 1}, {0, 0, 1}, {0, 0, 1}, {0, 0, 1}, {0, 0, 1}, {0, 0, 1}, {0, 0, 1}};
+    char bytes[sizeof buffer + sizeof normals];
+    memcpy(bytes, &buffer, sizeof buffer);
+    memcpy(bytes + sizeof buffer, normals, sizeof normals);
+    char *json = text(HEAD
+        "\"meshes\":[{\"primitives\":["
+        "{\"attributes\":{\"POSITION\":0,\"NORMAL\":3},\"indices\":1},"
+        "{\"attributes\":{\"POSITION\":0,\"NORMAL\":3},\"indices\":2}]}],"
+        "\"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":8,\"type\":\"VEC3\"},"
+        "{\"bufferView\":1,\"componentType\":5123,\"count\":6,\"type\":\"SCALAR\"},"
+        "{\"bufferView\":1,\"byteOffset\":12,\"componentType\":5123,\"count\":6,"
+        "\"type\":\"SCALAR\"},"
+        "{\"bufferView\":2,\"componentType\":5126,\"count\":8,\"type\":\"VEC3\"}],"
+        "\"bufferViews\":[{\"buffer\":0,\"byteLength\":96},"
+        "{\"buffer\":0,\"byteOffset\":96,\"byteLength\":24},"
+        "{\"buffer\":0,\"byteOffset\":120,\"byteLength\":96}],"
+        "\"buffers\":[{\"byteLength\":216,\"uri\":\"data:;base64,%s\"}]}",
+        base64(bytes, sizeof bytes));
+    struct imported r = import_json(json);
+    free(json);
+    CHECK(r.ok && r.scene.primitive_count == 2);
+    CHECK(r.ok && r.scene.primitives[0].vertex_count == 3); /* vertex 3 was vertex 0 */
+    CHECK(r.ok && r.scene.primitives[1].vertex_count == 4);
+    CHECK(r.ok && draws(&r.scene, V(0, 0, 0), V(0, 1, 0), V(1, 0, 0)));
+    CHECK(r.ok && draws(&r.scene, V(5, 1, 0), V(6, 0, 0), V(6, 1, 0)));
+    imported_free(&r);
+}
+
+#define SIDE 40 /* quads along a side of the sheet: 3200 triangles */
+
+static void meshlets(void)
+{
+    static struct {
+        float p[SIDE + 1][SIDE + 1][3];
+        uint16_t i[SIDE][SIDE][6];
+    } sheet;
+    for (int y = 0; y <= SIDE; y++)
+        for (int x = 0; x <= SIDE; x++) {
+            const float p[3] = {(float)x, (float)y, (float)((x * 7 + y * 3) % 5)};
+            memcpy(sheet.p[y][x], p, sizeof p);
+        }
+    for (int y = 0; y < SIDE; y++)
+        for (int x = 0; x < SIDE; x++) {
+            uint16_t a = (uint16_t)(y * (SIDE + 1) + x), b = (uint16_t)(a + SIDE + 1);
+            const uint16_t i[6] = {
+                a, (uint16_t)(a + 1), b, b, (uint16_t)(a + 1), (uint16_t)(b + 1)};
+            memcpy(sheet.i[y][x], i, sizeof i);
+        }
+    char *json = text(HEAD
+        "\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0},\"indices\":1}]}],"
+        "\"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":%zu,\"type\":\"VEC3\"},"
+        "{\"bufferView\":0,\"byteOffset\":%zu,\"componentType\":5123,\"count\":%zu,"
+        "\"type\":\"SCALAR\"}],"
+        "\"bufferViews\":[{\"buffer\":0,\"byteLength\":%zu}],"
+        "\"buffers\":[{\"byteLength\":%zu,\"uri\":\"data:;base64,%s\"}]}",
+        sizeof sheet.p / 12, sizeof sheet.p, sizeof sheet.i / 2, sizeof sheet, sizeof sheet,
+        base64(&sheet, sizeof sheet));
+    struct imported r = import_json(json);
+    free(json);
+    CHECK(r.ok && r.scene.header->triangles == 2 * SIDE * SIDE);
+    if (!r.ok)
+        return;
+    uint32_t covered = 0;
+    for (uint32_t i = 0; i < r.scene.meshlet_count; i++) {
+        const struct psc_meshlet *m = &r.scene.meshlets[i];
+        CHECK(m->first_index == covered && m->index_count <= 3 * 124);
+        CHECK(m->radius < 16); /* compact: the sheet itself has radius 28 */
+        covered += m->index_count;
+    }
+    CHECK(covered == 6 * SIDE * SIDE);
+    CHECK(r.scene.meshlet_count <= 2 * SIDE * SIDE / 80);
+    int missing = 0; /* every triangle of the sheet is still there */
+    for (int y = 0; y < SIDE; y += 3)
+        for (int x = 0; x < SIDE; x += 3) {
+            missing += !draws(&r.scene, sheet.p[y][x], sheet.p[y][x + 1], sheet.p[y + 1][x]);
+            missing +=
+                !draws(&r.scene, sheet.p[y + 1][x], sheet.p[y][x + 1], sheet.p[y + 1][x + 1]);
+        }
+    CHECK(missing == 0);
+    imported_free(&r);
+}
+
+/* Coordinates whose areas overflow single precision: the meshlet builder gives up, we must not. */
+static void huge(void)
+{
+    const float p[6][3] = {{1e12f, 0, 0}, {0, 1e12f, 0}, {0, 0, 1e12f}, {-1e12f, 0, 0},
+        {0, -1e12f, 0}, {0, 0, -1e12f}};
+    char *json = text(HEAD
+        "\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0}}]}],"
+        "\"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":6,\"type\":\"VEC3\"}],"
+        "\"bufferViews\":[{\"buffer\":0,\"byteLength\":72}],"
+        "\"buffers\":[{\"byteLength\":72,\"uri\":\"data:;base64,%s\"}]}",
+        base64(p, sizeof p));
+    struct imported r = import_json(json);
+    CHECK(r.ok && r.scene.header->triangles == 2 && draws(&r.scene, p[0], p[1], p[2]));
+    imported_free(&r);
+    free(json);
+}
+
+int main(void)
+{
+    modes();
+    attributes();
+    sharing_and_welding();
+    meshlets();
+    huge();
+    CHECK_DONE();
+}

@@ -331,6 +331,8 @@ bool frame_render(const struct frame_job *job, struct pen_frame *frame, struct p
     result->triangles_drawn = (uint32_t)f.triangles;
     ok = true;
 done:
+    if (job->technique->finish)
+        job->technique->finish(job->ctx, job->technique_state, result);
     gl.DeleteBuffers(1, &f.view_buffer);
     return ok;
 }

@@ -15,7 +15,6 @@ struct view_block {
 
 /* As ShadeBlock in shade.frag. */
 struct shade_block {
-    int32_t count[4];
     struct {
         float origin[4], half_x[4], half_y[4], z[4], radiance[4];
     } lights[PEN_MAX_LIGHTS];
@@ -57,7 +56,8 @@ void frame_targets_finish(struct frame_targets *t)
     memset(t, 0, sizeof *t);
 }
 
-static void fit_sum(struct gl_texture *texture, GLuint *framebuffer, uint32_t width, uint32_t height)
+static void fit_sum(
+    struct gl_texture *texture, GLuint *framebuffer, uint32_t width, uint32_t height)
 {
     static const float zero[4] = {0};
     if (gl_texture_fit(texture, GL_RGBA32F, width, height, 0, 1) || !*framebuffer) {
@@ -214,7 +214,6 @@ static void scale3(float out[4], const float v[3], float factor, float w)
 static void make_shade_block(const struct frame *f, struct shade_block *b)
 {
     memset(b, 0, sizeof *b);
-    b->count[0] = (int32_t)f->light_count;
     for (uint32_t i = 0; i < f->light_count; i++) {
         const struct light *l = &f->lights[i];
         const struct light_face *face = &l->faces[0];
@@ -247,8 +246,9 @@ static bool shade(struct frame *f, struct pen_error *error)
         round |= type == PEN_LIGHT_DISK || type == PEN_LIGHT_SPHERE;
         punctual |= type >= PEN_LIGHT_SUN;
     }
-    char defines[160];
-    snprintf(defines, sizeof defines, "%s%s%s%s%s", direct ? "#define RESOLVE\n" : "",
+    char defines[192];
+    snprintf(defines, sizeof defines, "#define LIGHTS %u\n%s%s%s%s%s%s", f->light_count,
+        job->scene->has_gloss ? "#define GLOSSY\n" : "", direct ? "#define RESOLVE\n" : "",
         emission ? "#define EMIT\n" : "", rect ? "#define HAS_RECT\n" : "",
         round ? "#define HAS_ROUND\n" : "", punctual ? "#define HAS_PUNCTUAL\n" : "");
     return pass_fill(job->ctx,
@@ -295,8 +295,8 @@ static bool render_jittered(struct frame *f, uint32_t number, struct pen_error *
     upload_view(f, number);
     return pass_gbuffer(f->job->ctx, f->job->scene, &f->view, r->ground.on,
                &f->job->targets->gbuffer, &f->triangles, error) &&
-        (!(beauty || visibility) || record_visibility(f, error)) &&
-        (!beauty || shade(f, error)) && (!visibility || add_visibility(f, error));
+           (!(beauty || visibility) || record_visibility(f, error)) &&
+           (!beauty || shade(f, error)) && (!visibility || add_visibility(f, error));
 }
 
 bool frame_render(const struct frame_job *job, struct pen_frame *frame, struct pen_result *result,

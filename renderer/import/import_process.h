@@ -2,8 +2,8 @@
  *
  *   penumbra-import --mode scene|image --source-id <64 hex> [--memory-mb 2048] [--cpu-seconds 60]
  *
- * Inherited descriptors: PEN_IMPORT_SOURCE_FD the uploaded bytes (regular file or memfd, read-only),
- * PEN_IMPORT_OUTPUT_FD where the .pscene goes (empty file or memfd, read-write), and
+ * Inherited descriptors: PEN_IMPORT_SOURCE_FD the uploaded bytes (regular file or memfd,
+ * read-only), PEN_IMPORT_OUTPUT_FD where the .pscene goes (empty file or memfd, read-write), and
  * PEN_IMPORT_REPORT_FD a pipe on which it writes exactly one struct pen_error (code PEN_OK: done)
  * before it exits 0. No report, or another exit status: it crashed or hit a limit; the front end
  * answers 422. It puts itself into its sandbox (rlimits, no_new_privs, Landlock, seccomp) before it

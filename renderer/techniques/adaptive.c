@@ -48,7 +48,7 @@ static const struct pen_param rows[] = {
     PARAM(struct adaptive, pcf_search_taps, .def = 16, .min = 1, .max = 64,
         .help = "Estimator pcf: samples used to find the average blocker depth."),
     PARAM(struct adaptive, pcf_taps, .def = 64, .min = 4, .max = 256,
-        .help = "Estimator pcf: depth comparisons of the whole filter; a cell takes a quarter."),
+        .help = "Estimator pcf: depth comparisons of the whole filter, halved by each split."),
     PARAM(struct adaptive, search_taps, .def = 2, .min = 1, .max = 8,
         .help = "Estimator csm: lookups per axis of the blocker average."),
     PARAM(struct adaptive, taps, .def = 4, .min = 1, .max = 8,

@@ -43,17 +43,22 @@ int adaptive_window(Receiver r, vec2 extent)
     return window_class(r.q, extent, r.plane, r.bias, 0.0, r.map_size);
 }
 
+// Four times the taps where the first ones find nothing although the pyramid cannot prove the window
+// lit: at the outer edge of a penumbra blockers fill a small part of it.
 float adaptive_blocker_depth(Receiver r, vec2 extent, bool wanted, float nearest_z, float receiver_z)
 {
-    int count = wanted ? int(P(pcf_search_taps)) : 0;
-    Taps taps = taps_begin(int(P(pcf_search_taps)), vec2(0.5));
     float sum = 0.0, blockers = 0.0;
-    for (int i = 0; i < count; i++) {
-        vec2 offset = taps_next(taps) * extent;
-        float d = textureLod(shadow_map, light_uv(r.q + offset), 0.0).r;
-        if (d < plane_depth(r.plane, offset, r.bias)) {
-            sum += light_linear(d);
-            blockers += 1.0;
+    for (int round = 0; round < 2; round++) {
+        int count = int(P(pcf_search_taps)) << (2 * round);
+        Taps taps = taps_begin(count, vec2(0.5));
+        count = wanted && blockers == 0.0 ? count : 0;
+        for (int i = 0; i < count; i++) {
+            vec2 offset = taps_next(taps) * extent;
+            float d = textureLod(shadow_map, light_uv(r.q + offset), 0.0).r;
+            if (d < plane_depth(r.plane, offset, r.bias)) {
+                sum += light_linear(d);
+                blockers += 1.0;
+            }
         }
     }
     return blockers > 0.0 ? min(sum / blockers, receiver_z) : receiver_z;
@@ -61,7 +66,7 @@ float adaptive_blocker_depth(Receiver r, vec2 extent, bool wanted, float nearest
 
 float estimate(Receiver r, vec2 offset, vec2 extent, int level)
 {
-    int count = level == 0 ? int(P(pcf_taps)) : max(int(P(pcf_taps)) / 4, 1);
+    int count = max(int(P(pcf_taps)) >> level, 1);
     Taps taps = taps_begin(count, vec2(0.5));
     float lit = 0.0;
     for (int i = 0; i < count; i++) {

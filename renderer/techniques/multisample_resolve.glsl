@@ -4,7 +4,13 @@ vec4 visibility(Surface s)
 {
     vec4 sum = texelFetch(accumulated, s.pixel, 0);
     // A textured light's mean visibility is that of its luminance: there is no fifth channel.
+#if P_weighting == 0
+    // a: the share of the light above the horizon. Where little of it is left the mean would rest on
+    // a few samples, and irradiance is next to nothing: there it fades to 0 instead.
+    sum.rgb /= max(sum.a, 0.25);
+#else
     sum.rgb /= max(sum.a, 1e-20);
+#endif
     if (light.textured == 0)
         return scalar_visibility(sum.r);
     const vec3 luminance = vec3(0.2126, 0.7152, 0.0722);

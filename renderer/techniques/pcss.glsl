@@ -38,7 +38,7 @@ vec4 visibility(Surface s)
     float v = count > 0 ? lit / float(count) : 1.0;
 #ifdef INTERLEAVED
     // Width of the penumbra on the screen, F5, for the averaging pass.
-    float scale = light.parallel != 0 ? 1.0 : s.p.z / light.near_z;
+    float scale = light_parallel ? 1.0 : s.p.z / light.near_z;
     float pixels = 2.0 * extent.x * scale * view.eye.w * s.depth / view.forward.w;
     return vec4(v, count > 0 ? pixels : 0.0, 0.0, 1.0);
 #else

@@ -68,6 +68,8 @@ struct technique {
     size_t state_size;
     bool (*create)(struct technique_ctx *, void *state, struct pen_error *); /* optional */
     bool (*record)(struct technique_run *, struct pen_error *);
+    /* Optional: all frames of an image are recorded (or failed); counts go into the result. */
+    void (*finish)(struct technique_ctx *, void *state, struct pen_result *);
     void (*destroy)(struct technique_ctx *, void *state); /* optional */
 };
 

@@ -124,7 +124,7 @@ float cell_visibility(Receiver r, float f, float depth, vec2 offset, vec2 extent
 #else
     float low = series.low, high = series.low + 1.0 / series.scale;
     if (P(contact)) {
-        float nearest = min_max_window(r.q + offset, extent).x;
+        float nearest = min(min_max_window(r.q + offset, extent).x, light.far_z);
         float z = (nearest - light.near_z) / (light.far_z - light.near_z) * series.range;
         float x = z - depth + series.offset;
         if (x > -series.offset)

@@ -27,8 +27,8 @@ static void count_classes(struct technique_run *run, const struct gl_texture *ti
     free(classes);
 }
 
-static bool fill_umbra(
-    struct technique_run *run, const struct gl_texture *tiles, struct pen_error *error)
+bool pass_fill_umbra(struct technique_run *run, const struct gl_texture *tiles, GLuint framebuffer,
+    struct pen_error *error)
 {
     struct gl_program_desc desc = {.vertex = "tiles.vert",
         .fragment = "constant.frag",
@@ -36,13 +36,13 @@ static bool fill_umbra(
     GLuint program = gl_programs_get(run->ctx->programs, &desc, error);
     if (!program)
         return false;
-    pass_draw_tiles(run->ctx, program, run->vis_framebuffer, tiles, TILE_UMBRA, run->width,
-        run->height, false);
+    pass_draw_tiles(
+        run->ctx, program, framebuffer, tiles, TILE_UMBRA, run->width, run->height, false);
     return true;
 }
 
-const struct gl_texture *pass_classify(struct technique_run *run, const struct shadow_input *casters,
-    float margin_texels, struct pen_error *error)
+const struct gl_texture *pass_classify(struct technique_run *run,
+    const struct shadow_input *casters, float margin_texels, struct pen_error *error)
 {
     struct technique_ctx *ctx = run->ctx;
     struct gl_texture *tiles = &ctx->tiles;
@@ -55,10 +55,9 @@ const struct gl_texture *pass_classify(struct technique_run *run, const struct s
     }
     /* Spheres' far sides and textured lights need no zero tiles of their own: 0 is 0 in any colour;
      * but an omnidirectional light lights what lies behind its plane. */
-    struct classify_block block = {.margin = {margin_texels + 1},
-        .tile = {CLASSIFY_TILE, run->face->omni ? 0 : 1}};
-    struct pass_texture textures[] = {
-        {UNIT_DEPTH, run->gbuffer->depth.name, GL_SAMPLE_NEAREST},
+    struct classify_block block = {
+        .margin = {margin_texels + 1}, .tile = {CLASSIFY_TILE, run->face->omni ? 0 : 1}};
+    struct pass_texture textures[] = {{UNIT_DEPTH, run->gbuffer->depth.name, GL_SAMPLE_NEAREST},
         {UNIT_MIN_MAX, casters->textures[0].name, GL_SAMPLE_NEAREST}};
     if (!pass_fill(ctx,
             &(struct pass_fill){.name = "classify",
@@ -72,7 +71,7 @@ const struct gl_texture *pass_classify(struct technique_run *run, const struct s
                 .extra = &block,
                 .extra_bytes = sizeof block},
             error) ||
-        !fill_umbra(run, tiles, error))
+        !pass_fill_umbra(run, tiles, run->vis_framebuffer, error))
         return NULL;
     count_classes(run, tiles);
     return tiles;

@@ -23,6 +23,7 @@ enum {
 #undef TECHNIQUE
 
 #define MAX_RESIDENT 256
+#define EMISSION_BYTES (64u << 20) /* kept emission textures; they are cheap to make again */
 
 const char *const pen_device_choice_names[] = {"auto", "gpu", "surfaceless", "osmesa", NULL};
 
@@ -34,6 +35,7 @@ struct pen_renderer {
     bool lost;
     struct scene *scenes[MAX_RESIDENT]; /* emission images too: scenes without geometry */
     uint32_t scene_count;
+    struct emission_cache *emissions;
     void *states[TECHNIQUE_COUNT];
 };
 
@@ -63,6 +65,7 @@ struct pen_renderer *pen_renderer_create(
     r->ctx.shadow_budget = r->budget / 2;
     r->ctx.programs = gl_programs_create();
     r->ctx.shadows = shadow_cache_create();
+    r->emissions = emission_cache_create();
     gl_samplers_init(&r->ctx.samplers);
     gl_timer_init(&r->ctx.timer, r->ctx.device.software);
     gl.CreateVertexArrays(1, &r->ctx.empty_array);
@@ -97,6 +100,7 @@ void pen_renderer_destroy(struct pen_renderer *r)
         scene_destroy(r->scenes[i]);
     frame_targets_finish(&r->targets);
     shadow_cache_destroy(r->ctx.shadows);
+    emission_cache_destroy(r->emissions);
     gl_timer_finish(&r->ctx.timer);
     gl_samplers_finish(&r->ctx.samplers);
     gl_programs_destroy(r->ctx.programs);
@@ -138,12 +142,13 @@ static uint64_t scene_bytes(const struct pen_renderer *r)
 
 uint64_t pen_renderer_gpu_bytes(const struct pen_renderer *r)
 {
-    return scene_bytes(r) + shadow_cache_bytes(r->ctx.shadows);
+    return scene_bytes(r) + shadow_cache_bytes(r->ctx.shadows) + emission_cache_bytes(r->emissions);
 }
 
 static void remove_scene(struct pen_renderer *r, uint32_t i)
 {
     shadow_cache_drop_scene(r->ctx.shadows, r->scenes[i]);
+    emission_cache_drop(r->emissions, r->scenes[i]->id);
     scene_destroy(r->scenes[i]);
     r->scenes[i] = r->scenes[--r->scene_count];
 }
@@ -218,13 +223,13 @@ bool pen_renderer_has_image(const struct pen_renderer *r, const uint8_t id[PEN_I
     return pen_renderer_has_scene(r, id);
 }
 
-static const struct gl_texture *find_image(void *owner, const struct pen_light *light)
+static const struct scene *find_image(void *owner, const struct pen_light *light)
 {
     struct pen_renderer *r = owner;
-    if (light->texture != PEN_TEXTURE_IMAGE)
-        return NULL;
     struct scene *scene = find_scene(r, light->image);
-    return scene && scene->blob.image_count ? &scene->images[0] : NULL;
+    if (scene)
+        scene->last_use = ++r->clock;
+    return scene;
 }
 
 bool pen_renderer_render(struct pen_renderer *r, const struct pen_request *request,
@@ -251,10 +256,12 @@ bool pen_renderer_render(struct pen_renderer *r, const struct pen_request *reque
         .request = &result->completed,
         .technique = technique_registry[t],
         .technique_state = r->states[t],
+        .emissions = r->emissions,
         .find_image = find_image,
         .owner = r};
     bool ok = frame_render(&job, frame, result, error);
     evict(r, scene);
+    emission_cache_trim(r->emissions, EMISSION_BYTES);
     result->gpu_bytes = pen_renderer_gpu_bytes(r);
     GLenum gl_error = gl.GetError();
     if (ok && gl_error == GL_NO_ERROR)

@@ -60,6 +60,7 @@ struct technique_run {
     const struct gl_texture *emission; /* of the light, with mips, or ctx->white */
     struct pen_result *result;         /* warnings and counts */
     uint32_t width, height;            /* px of vis and G-buffer */
+    uint32_t frame;                    /* number of the jittered frame */
 };
 
 struct technique {
@@ -67,6 +68,8 @@ struct technique {
     size_t state_size;
     bool (*create)(struct technique_ctx *, void *state, struct pen_error *); /* optional */
     bool (*record)(struct technique_run *, struct pen_error *);
+    /* Optional: all frames of an image are recorded (or failed); counts go into the result. */
+    void (*finish)(struct technique_ctx *, void *state, struct pen_result *);
     void (*destroy)(struct technique_ctx *, void *state); /* optional */
 };
 

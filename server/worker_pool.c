@@ -20,6 +20,7 @@
 #define MAX_ATTEMPTS 6 /* of one render, when somebody else ends the workers */
 #define QUIT_MS 3000
 #define MAX_BACKOFF_MS 5000
+#define START_PATIENCE_NS (120 * CLOCK_S)
 #define MAX_DROPS 64
 
 enum phase { PHASE_SENT, PHASE_RENDERING, PHASE_ENCODING };
@@ -358,11 +359,14 @@ static bool feed(struct slot *slot)
 static bool is_hung(const struct slot *slot, uint64_t now)
 {
     uint64_t patience = slot->pool->config.hang_timeout_ms * CLOCK_MS;
+    /* A start and a warm-up take their time, whatever is asked of renders. */
+    uint64_t start = patience > START_PATIENCE_NS ? patience : START_PATIENCE_NS;
     if (!slot->said_hello)
-        return now - slot->spawned_ns > patience;
+        return now - slot->spawned_ns > start;
     for (int i = 0; i < IN_FLIGHT; i++) {
         const struct flight *flight = &slot->flights[i];
-        if (flight->render && now - flight->since_ns > patience &&
+        uint64_t limit = flight->phase == PHASE_SENT ? start : patience;
+        if (flight->render && now - flight->since_ns > limit &&
             now > flight->render->last_deadline_ns)
             return true;
     }

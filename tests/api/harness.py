@@ -97,8 +97,9 @@ class Daemon:
         head = {"Content-Type": "application/json"}
         if fresh:
             head["Cache-Control"] = "no-cache"
+        request = {"deadline_ms": int(30000 * SLOW), **(request or {})}
         head.update({k.replace("_", "-"): v for k, v in headers.items()})
-        return self.call("POST", "/v1/scenes/%s/render" % scene, json.dumps(request or {}), head,
+        return self.call("POST", "/v1/scenes/%s/render" % scene, json.dumps(request), head,
                          timeout=timeout)
 
     def metric(self, name, labels=""):

@@ -95,7 +95,7 @@ class Faults(unittest.TestCase):
         bad = [a if isinstance(a, Exception) else (a.status, a.body[:200])
                for a in answers if isinstance(a, Exception) or a.status != 200]
         self.assertEqual(bad, [])
-        self.assertGreater(len(answers), 10)
+        self.assertGreater(len(answers), 10 / SLOW)
         self.assertGreaterEqual(self.d.metric("penumbra_worker_restarts_total"), 3)
         self.assertEqual(self.d.metric("penumbra_quarantined_scenes"), 0)
 
@@ -122,8 +122,12 @@ class Faults(unittest.TestCase):
         self.d.start()
         scene = self.d.upload(grid_scene(4))
         self.assertEqual(self.d.render(scene, SMALL).status, 200)
+        thread, box = self.in_background(scene, dict(HEAVY, antialias=16, deadline_ms=600))
+        wait(lambda: self.d.metric("penumbra_renders_running") == 1)
+        time.sleep(0.2)
         os.kill(self.d.worker(), signal.SIGSTOP)
-        late = self.d.render(scene, dict(SMALL, deadline_ms=300))
+        thread.join()
+        late = box[0]
         self.assertEqual(late.status, 504, late.body)
         self.assertTrue(late.json()["retryable"])
         wait(lambda: self.d.metric("penumbra_worker_hangs_total") == 1)

@@ -37,7 +37,7 @@ struct technique_ctx {
 
 struct gbuffer {
     struct gl_texture depth;   /* D32F, reversed, 0: background */
-    struct gl_texture normal;  /* RGBA16F: octahedral geometric normal, octahedral shading normal */
+    struct gl_texture normal;  /* RGBA16: octahedral geometric normal, octahedral shading normal */
     struct gl_texture albedo;  /* RGBA8: square root of albedo, flags */
     struct gl_texture surface; /* RGBA8: roughness, metallic, occlusion, specular scale */
     struct gl_texture emission; /* R11G11B10F; only when the scene has any */

@@ -42,9 +42,12 @@ bool pass_light_samples(struct technique_run *run, uint32_t maps, uint32_t map_s
     sample_points(run->face, maps, points);
     uint64_t bytes = (uint64_t)maps * map_size * map_size * 4 * run->light->face_count;
     bool keep = bytes <= run->ctx->shadow_budget;
-    pass_scratch_cleared(run, SCRATCH_LIT, textured ? GL_RGBA16F : GL_RG16F, zero);
-    if (textured)
-        pass_scratch_cleared(run, SCRATCH_ALL, GL_RGBA16F, zero);
+    for (int i = 0; i < (textured ? 2 : 1); i++) {
+        const struct gl_texture *sum =
+            pass_scratch(run, SCRATCH_LIT + i, textured ? GL_RGBA16F : GL_RG16F, 1);
+        if (pass_is_first_face(run))
+            pass_scratch_clear(sum, zero);
+    }
     for (uint32_t first = 0; first < maps; first += SAMPLE_MAP_BATCH) {
         uint32_t left = maps - first, count = left < SAMPLE_MAP_BATCH ? left : SAMPLE_MAP_BATCH;
         struct sample_block block = {.range = {(int32_t)count, (int32_t)first, (int32_t)maps},

@@ -9,7 +9,9 @@ bool pass_penumbra_spread(
     const struct shadow_input *min_max = map ? pass_caster_min_max(run, map_size, error) : NULL;
     if (!min_max)
         return false;
-    const struct gl_texture *spread = pass_scratch_cleared(run, SCRATCH_SPREAD, GL_RGBA16F, none);
+    const struct gl_texture *spread = pass_scratch(run, SCRATCH_SPREAD, GL_RGBA16F, 1);
+    if (pass_is_first_face(run))
+        pass_scratch_clear(spread, none);
     GLuint framebuffer = gl_framebuffer_create(&spread, 1, NULL);
     struct pass_texture pyramid = {UNIT_MIN_MAX, min_max->textures[0].name, GL_SAMPLE_NEAREST};
     bool ok = pass_screen(run,

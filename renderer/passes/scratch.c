@@ -8,16 +8,11 @@ const struct gl_texture *pass_scratch(
     return texture;
 }
 
-const struct gl_texture *pass_scratch_cleared(
-    struct technique_run *run, enum pass_scratch_slot slot, GLenum format, const float value[4])
+void pass_scratch_clear(const struct gl_texture *texture, const float value[4])
 {
-    const struct gl_texture *texture = pass_scratch(run, slot, format, 1);
-    if (pass_is_first_face(run)) {
-        GLuint framebuffer = gl_framebuffer_create(&texture, 1, NULL);
-        gl.ClearNamedFramebufferfv(framebuffer, GL_COLOR, 0, value);
-        gl.DeleteFramebuffers(1, &framebuffer);
-    }
-    return texture;
+    GLuint framebuffer = gl_framebuffer_create(&texture, 1, NULL);
+    gl.ClearNamedFramebufferfv(framebuffer, GL_COLOR, 0, value);
+    gl.DeleteFramebuffers(1, &framebuffer);
 }
 
 void pass_scratch_finish(struct technique_ctx *ctx)

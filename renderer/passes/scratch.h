@@ -9,6 +9,10 @@ enum pass_scratch_slot {
     SCRATCH_ALL, /* what a filter reads */
     SCRATCH_LIT_NEXT,
     SCRATCH_ALL_NEXT, /* and writes */
+    SCRATCH_HARD,
+    SCRATCH_AXES,
+    SCRATCH_EDGES,
+    SCRATCH_LINES, /* of techniques/erosion.c */
     SCRATCH_SLOTS
 };
 _Static_assert(
@@ -18,11 +22,9 @@ _Static_assert(
 /* The slot's texture with this format and number of levels (0: the whole chain). */
 const struct gl_texture *pass_scratch(
     struct technique_run *run, enum pass_scratch_slot slot, GLenum format, uint32_t levels);
-/* The same, every pixel of level 0 set to `value` when this is the light's first face: methods that
- * filter over the screen collect the faces of a light first. */
-const struct gl_texture *pass_scratch_cleared(
-    struct technique_run *run, enum pass_scratch_slot slot, GLenum format, const float value[4]);
+void pass_scratch_clear(const struct gl_texture *texture, const float value[4]); /* level 0 */
 void pass_scratch_finish(struct technique_ctx *ctx);
 
+/* Methods that filter over the screen collect the faces of a light first. */
 bool pass_is_first_face(const struct technique_run *run);
 bool pass_is_last_face(const struct technique_run *run);

@@ -17,7 +17,14 @@ void main()
     Plane plane = plane_at(pixel);
     RATIO own = ratio_at(pixel), sum = own * 1e-4;
     float total = 1e-4;
-    int n = max(spread.y, spread.w) > 0.1 ? level.step.y : -1;
+    bool wide = max(spread.y, spread.w) > 0.1;
+    // Samples that disagree where the centre of the light saw no penumbra: a pixel or two.
+    if (!wide && ratio_is_mixed(own)) {
+        wide = true;
+        spread.z = 0.0;
+        deviation = vec2(1.5);
+    }
+    int n = wide ? level.step.y : -1;
     for (int y = -n; y <= n; y++)
         for (int x = -n; x <= n; x++) {
             ivec2 offset = ivec2(x, y) * level.step.x, at = pixel + offset;

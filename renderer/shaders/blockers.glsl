@@ -3,6 +3,7 @@
 // its nearest depth counts.
 #include "taps.glsl"
 #include "min_max.glsl"
+#include "hard_lit.glsl"
 
 // Half extents on the map plane of the light's image by the average blocker; 0 where nothing blocks
 // or where all of the light is hidden, so that there is nothing to filter. `least`: its lower bound.
@@ -36,12 +37,4 @@ vec2 blocker_extent(Surface s, ReceiverPlane plane, vec2 q, vec2 least, float bi
     if (blockers == 0.0)
         return vec2(0.0);
     return max(light_filter_extent(min(sum / blockers, s.p.z), s.p.z), least);
-}
-
-// One comparison seen from the light's centre, on the receiver's plane at the texel's own centre.
-bool hard_lit(Surface s, ReceiverPlane plane, vec2 q, vec2 texel, float bias, out float depth)
-{
-    vec2 center = (floor((q - light.rect.xy) / texel) + 0.5) * texel + light.rect.xy;
-    depth = texture(shadow_map, light_uv(q)).r;
-    return plane_depth(plane, center - q, bias) <= depth;
 }

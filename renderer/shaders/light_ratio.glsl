@@ -32,6 +32,15 @@ RATIO ratio_at(ivec2 pixel)
 #endif
 }
 
+bool ratio_is_mixed(RATIO r)
+{
+#ifdef TEXTURED
+    return r[0].a > 0.0 && r[0].a < r[1].a;
+#else
+    return r.x > 0.0 && r.x < r.y;
+#endif
+}
+
 #ifdef LAST
 layout(location = 0) out vec4 vis;
 #elif defined(TEXTURED)

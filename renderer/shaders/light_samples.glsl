@@ -2,7 +2,7 @@
 // SPARSE every pixel takes every sample; with it P(samples) of them, others than its neighbours.
 // EMITTED: the denominator of a textured light.
 #ifdef SPARSE
-#include "taps.glsl"
+#include "dither.glsl"
 #endif
 layout(binding = 7) uniform sampler2DArray maps;
 struct SampleMap {
@@ -48,19 +48,23 @@ vec4 visibility(Surface s)
 {
     float depth = light_depth(s.p.z), bias = P(bias) * s.p.z * light_depth_slope(s.p.z);
 #ifdef SPARSE
-    // Pixels of a 4 x 4 block divide each stratum among themselves.
-    float stratum = float(batch.range.z) / float(P(samples));
-    float shift = frame_shift(s.pixel).x * stratum;
-    int first = max(int(ceil((float(batch.range.y) - shift) / stratum)), 0);
-    int end = min(int(ceil((float(batch.range.y + batch.range.x) - shift) / stratum)),
-        int(P(samples)));
+    // The maps in order of x fall into as many strata as a pixel takes samples. Pixels of a 4 x 4
+    // block divide each stratum among themselves; from stratum to stratum a pixel moves on, since
+    // the maps' y repeats in each.
+    float stratum = float(batch.range.z) / float(P(samples)), phase = dither(s.pixel, view.display.z);
+    int first = int(float(batch.range.y) / stratum);
+    int end = min(int(ceil(float(batch.range.y + batch.range.x) / stratum)), int(P(samples)));
 #else
     int first = 0, end = batch.range.x;
 #endif
     vec4 sum = vec4(0.0);
     for (int k = first; k < end; k++) {
 #ifdef SPARSE
-        int i = clamp(int(float(k) * stratum + shift) - batch.range.y, 0, batch.range.x - 1);
+        int number = min(int((float(k) + fract(phase + float(k) / stratum)) * stratum),
+            batch.range.z - 1);
+        int i = number - batch.range.y;
+        if (i < 0 || i >= batch.range.x)
+            continue;
 #else
         int i = k;
 #endif

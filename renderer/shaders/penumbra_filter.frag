@@ -2,7 +2,7 @@
 // Needs P(sigma), P(filter_taps), P(depth_sigma) and P(normal_power).
 #include "same_surface.glsl"
 #include "light_ratio.glsl"
-#include "taps.glsl"
+#include "dither.glsl"
 
 void main()
 {
@@ -12,10 +12,10 @@ void main()
         discard;
 #ifdef SECOND
     vec2 reach = 2.5 * P(sigma) * spread.w * vec2(spread.z, 1.0);
-    float shift = frame_shift(pixel.yx).y;
+    float shift = dither(pixel.yx, view.display.z);
 #else
     vec2 reach = vec2(2.5 * P(sigma) * spread.y, 0.0);
-    float shift = frame_shift(pixel).x;
+    float shift = dither(pixel, view.display.z);
 #endif
     // Taps lie at least a pixel apart; where they are farther, each pixel shifts them.
     float pixels = max(abs(reach.x), abs(reach.y));

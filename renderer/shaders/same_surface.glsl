@@ -1,35 +1,10 @@
 // How much a neighbouring pixel belongs to the surface under this one: distance from its plane and
 // difference of normals. Needs P(depth_sigma) and P(normal_power).
-#include "view.glsl"
-#include "octahedral.glsl"
-layout(binding = 0) uniform sampler2D g_depth;
-layout(binding = 1) uniform sampler2D g_normal;
-
-struct Plane {
-    vec3 normal;
-    float depth;
-    vec2 gradient; // of reversed depth, per pixel
-};
-
-Plane plane_at(ivec2 pixel)
-{
-    Plane plane;
-    plane.depth = texelFetch(g_depth, pixel, 0).r;
-    plane.normal = octahedral_decode(texelFetch(g_normal, pixel, 0).xy);
-    vec3 world = unproject(view.clip_to_world, pixel_to_ndc(pixel), plane.depth);
-    // Reversed infinite depth is linear over the screen on a plane.
-    vec4 h = vec4(plane.normal, -dot(plane.normal, world)) * view.clip_to_world;
-    vec2 most = vec2(0.2 * plane.depth);
-    plane.gradient = clamp(-h.xy * vec2(2.0, -2.0) * view.viewport.zw /
-            (abs(h.z) > 1e-20 ? h.z : 1e-20), -most, most);
-    return plane;
-}
+#include "surface_plane.glsl"
 
 float same_surface(Plane plane, ivec2 at, ivec2 offset)
 {
-    float depth = texelFetch(g_depth, at, 0).r;
-    float away = (depth - plane.depth - dot(plane.gradient, vec2(offset))) /
-        (P(depth_sigma) * plane.depth);
+    float away = plane_distance(plane, at, offset);
     float facing = max(dot(octahedral_decode(texelFetch(g_normal, at, 0).xy), plane.normal), 0.0);
     return exp(-0.5 * away * away) * pow(facing, float(P(normal_power)));
 }

@@ -32,6 +32,7 @@ struct technique_ctx {
     struct gl_texture sample_scratch; /* of passes/sample_maps.c */
     struct gl_texture sum;            /* RGBA32F accumulator of methods that add passes */
     GLuint sum_framebuffer;
+    struct gl_texture scratch[12];    /* of passes/scratch.c */
     uint64_t shadow_budget; /* bytes that one method's kept inputs should stay under */
 };
 

@@ -14,37 +14,49 @@ void add_patch(vec2 low, vec2 high, float share);
 
 const int LIT = 0, PENUMBRA = 1, UMBRA = 2;
 
+// F2's W is linear in hardware depth, W = (depth of the receiver - d) * W's range, so with map
+// positions divided by that range and the emitter, e = (l - q) / (range emitter), the emitter point
+// that l hides is e / (depth - d).
 struct PatchWindow {
-    int answer;          // LIT and UMBRA are proven: nothing is left to walk
-    vec2 q;              // the receiver on the map plane, m
-    vec2 texel;          // m
-    vec2 reach;          // half extent of the window, m
-    vec2 emitter;        // half extent of the emitter, m; at least the smallest filter's
-    ReceiverPlane plane;
-    float bias, receiver_z;
+    int answer;      // LIT and UMBRA are proven: nothing is left to walk
+    vec2 q;          // the receiver on the map plane, m
+    vec2 reach;      // half extent of the window, m
+    vec2 origin;     // e of the map's corner
+    vec2 texel;      // e per texel
+    float depth;     // of the receiver
+    vec2 gradient;   // of the depth of its plane, per e
+    float bias;
+    float widest;    // depth - d of the nearest caster: its shadow is as wide as the window
+    float narrowest; // the least that was met: of the sharpest shadow
 };
 
 PatchWindow patch_window(Surface s)
 {
     PatchWindow w;
     w.q = light_project(s.p);
-    w.texel = (light.rect.zw - light.rect.xy) / vec2(textureSize(caster_maps, 0).xy);
-    w.plane = receiver_plane(s.p, s.n);
+    vec2 texel = (light.rect.zw - light.rect.xy) / vec2(textureSize(caster_maps, 0).xy);
+    ReceiverPlane plane = receiver_plane(s.p, s.n);
+    w.depth = plane.depth;
     w.bias = P(bias) * s.p.z * light_depth_slope(s.p.z);
-    w.receiver_z = s.p.z;
-    vec2 least = P(min_filter) * w.texel;
+    vec2 least = P(min_filter) * texel;
     float nearest_z;
     w.reach = min_max_search_extent(w.q, s.p.z, least, nearest_z);
     // An emitter whose shadow of the nearest caster is narrower than the least filter is widened:
     // points and contacts get an edge of that width instead of a division by zero.
-    float scale = light_window_scale(min(nearest_z, s.p.z), s.p.z);
-    w.emitter = max(light.extent, least / max(scale, 1e-20));
-    vec2 range = min_max_window(w.q, w.reach);
+    float nearest = light_window_scale(min(nearest_z, s.p.z), s.p.z);
+    vec2 emitter = max(light.extent, least / max(nearest, 1e-20));
+    float range = (light.far_z - light.near_z) * (light.parallel != 0 ? 1.0 : 1.0 / light.far_z);
+    vec2 unit = range * emitter;
+    w.origin = (light.rect.xy - w.q) / unit;
+    w.texel = texel / unit;
+    w.gradient = plane.gradient * unit;
+    vec2 z = min_max_window(w.q, w.reach);
     vec2 low = w.q - w.reach, high = w.q + w.reach;
     bool inside = all(greaterThan(low, light.rect.xy)) && all(lessThan(high, light.rect.zw));
-    float least_plane = w.plane.depth - dot(abs(w.plane.gradient), w.reach) - w.bias;
-    bool all_hide = inside && range.y < s.p.z && light_depth(range.y) < min(least_plane, 1.0 - w.bias);
-    w.answer = range.x >= s.p.z ? LIT : all_hide ? UMBRA : PENUMBRA;
+    float least_plane = min(plane.depth - dot(abs(plane.gradient), w.reach), 1.0) - w.bias;
+    bool all_hide = inside && z.y < s.p.z && light_depth(z.y) < least_plane;
+    w.answer = z.x >= s.p.z ? LIT : all_hide ? UMBRA : PENUMBRA;
+    w.widest = w.narrowest = max(w.depth - light_depth(min(nearest_z, s.p.z)), 1e-20);
     return w;
 }
 
@@ -58,16 +70,16 @@ float caster_depth(ivec2 at, int layer)
 #if P_fill != 0 // none
 // Slopes are seen as steps. When a neighbour is a caster at about the same depth, the two share
 // their border: `extend` (Guennebaud et al. 2006) closes gaps, `join` also undoes overlaps.
-float filled_border(PatchWindow w, ivec2 neighbour, int layer, int level, float limit, float z,
-    float border, float emitter, float own)
+float filled_border(PatchWindow w, ivec2 neighbour, int layer, int level, float limit, float d,
+    float border, float own)
 {
     neighbour = max(neighbour, ivec2(0));
-    float d = level > 0 ? texelFetch(min_max_pyramid, ivec3(neighbour, layer), level - 1).r
-                        : caster_depth(neighbour, layer);
-    float its_z = light_linear(d);
-    bool near = d < limit && abs(its_z - z) < P(gap) * z;
-    float shared_border =
-        border / (max(light_window_scale(its_z, w.receiver_z), 1e-20) * emitter);
+    float its = level > 0 ? texelFetch(min_max_pyramid, ivec3(neighbour, layer), level - 1).r
+                          : caster_depth(neighbour, layer);
+    // dz / z in hardware depth; a parallel light has no distance, so there it is a share of the range.
+    float scale = light.parallel != 0 ? 1.0 : light.far_z / (light.far_z - light.near_z) - d;
+    bool near = its < limit && abs(its - d) < P(gap) * scale;
+    float shared_border = border / max(w.depth - its, 1e-20);
 #if P_fill == 1
     shared_border = min(own, shared_border);
 #endif
@@ -78,57 +90,55 @@ float filled_border(PatchWindow w, ivec2 neighbour, int layer, int level, float 
 // Order of the quadtree: children first, then the sibling, then whoever follows the parent.
 void next_node(inout ivec2 at, inout int level)
 {
-    int full = findLSB(~(at.x & at.y)); // ends of how many rows of siblings end here
+    int full = findLSB(~(at.x & at.y)); // how many rows of siblings end here
     at >>= full;
     level += full;
     at += (at.x & 1) == 0 ? ivec2(1, 0) : ivec2(-1, 1);
 }
 
-void walk_quadtree(PatchWindow w, int layer, ivec2 root, int root_level, int finest)
+void walk_quadtree(inout PatchWindow w, int layer, ivec2 root, int root_level, int finest)
 {
     ivec2 at = root;
     int level = root_level;
     bool walking = true;
     while (walking) {
-        ivec2 middle = (at << level) + ((1 << level) >> 1);
-        float d_middle = caster_depth(middle, layer);
         vec3 d = level > 0 ? texelFetch(min_max_pyramid, ivec3(at, layer), level - 1).rgb
-                           : vec3(d_middle);
-        vec2 low = light.rect.xy + vec2(at << level) * w.texel - w.q;
-        vec2 high = light.rect.xy + vec2((at + 1) << level) * w.texel - w.q;
-        float plane = min(w.plane.depth + dot(w.plane.gradient, 0.5 * (low + high)), 1.0);
-        float slack = level > 0 ? dot(abs(w.plane.gradient), 0.5 * (high - low)) : 0.0;
+                           : vec3(caster_depth(at, layer));
+        vec2 low = w.origin + vec2(at << level) * w.texel;
+        vec2 side = float(1 << level) * w.texel, high = low + side;
+        float plane = min(w.depth + dot(w.gradient, low + 0.5 * side), 1.0);
+        float slack = level > 0 ? 0.5 * dot(abs(w.gradient), side) : 0.0;
         // Who lies before the receiver and before its plane hides.
-        float least = min(plane - slack - w.bias, w.plane.depth);
-        float most = min(min(plane + slack, 1.0) - w.bias, w.plane.depth);
-        float limit = min(plane - w.bias, w.plane.depth);
+        float least = min(plane - slack - w.bias, w.depth);
+        float most = min(min(plane + slack, 1.0) - w.bias, w.depth);
         bool whole = d.y < least;
-        float near_scale = light_window_scale(light_linear(d.x), w.receiver_z);
-        float far_scale = light_window_scale(light_linear(d.y), w.receiver_z);
         // The receiver's own plane: depth is linear over the map, so the mean is the middle's.
         bool own = d.x >= plane - slack - w.bias && d.y <= plane + slack + w.bias &&
             abs(d.z - plane) <= w.bias;
-        vec2 edge = near_scale * w.emitter;
-        bool beside = any(greaterThan(low, edge)) || any(lessThan(high, -edge));
+        float widest = w.depth - d.x;
+        bool beside = any(greaterThan(low, vec2(widest))) || any(lessThan(high, vec2(-widest)));
         bool open = d.x < most && !own && !beside;
-        bool leaf = level == finest || (whole && near_scale - far_scale <= 0.016 * far_scale);
-        // Part of a coarse texel: the near depth hides as much as makes the mean of the two depths.
-        // Where the plane runs through the texel the middle decides.
-        bool mixed = !whole && d.x < least;
-        float share = mixed ? (d.y - d.z) / max(d.y - d.x, 1e-20) : 1.0;
-        float depth = whole ? d.z : mixed ? d.x : d_middle;
+        bool leaf = level == finest || (whole && d.y - d.x <= 0.016 * (w.depth - d.y));
         // A loop, because software rasterisers skip one but not a branch.
-        for (bool patch_here = open && leaf && depth < limit; patch_here; patch_here = false) {
-            float z = light_linear(depth);
-            vec2 scale = 1.0 / (max(light_window_scale(z, w.receiver_z), 1e-20) * w.emitter);
-            vec2 a = low * scale, b = high * scale;
+        for (bool patch_here = open && leaf; patch_here; patch_here = false) {
+            // Part of a coarse texel: the near depth hides as much as makes the mean of the two
+            // depths. Where the plane runs through the texel its middle decides.
+            bool mixed = !whole && d.x < least;
+            float share = mixed ? (d.y - d.z) / max(d.y - d.x, 1e-20) : 1.0;
+            float limit = min(plane - w.bias, w.depth);
+            float depth = whole ? d.z
+                : mixed         ? d.x
+                                : caster_depth((at << level) + ((1 << level) >> 1), layer);
+            float below = max(w.depth - depth, 1e-20);
+            vec2 a = low / below, b = high / below;
 #if P_fill != 0
-            a.x = filled_border(
-                w, at - ivec2(1, 0), layer, level, limit, z, low.x, w.emitter.x, a.x);
-            a.y = filled_border(
-                w, at - ivec2(0, 1), layer, level, limit, z, low.y, w.emitter.y, a.y);
+            a.x = filled_border(w, at - ivec2(1, 0), layer, level, limit, depth, low.x, a.x);
+            a.y = filled_border(w, at - ivec2(0, 1), layer, level, limit, depth, low.y, a.y);
 #endif
-            add_patch(a, b, share);
+            if (depth < limit) {
+                add_patch(a, b, share);
+                w.narrowest = min(w.narrowest, below);
+            }
         }
         if (open && !leaf) {
             at <<= 1;
@@ -142,11 +152,12 @@ void walk_quadtree(PatchWindow w, int layer, ivec2 root, int root_level, int fin
     }
 }
 
-void walk_patches(PatchWindow w)
+void walk_patches(inout PatchWindow w)
 {
     ivec2 end = textureSize(caster_maps, 0).xy - 1;
-    ivec2 first = clamp(ivec2(floor((w.q - w.reach - light.rect.xy) / w.texel)), ivec2(0), end);
-    ivec2 last = clamp(ivec2(floor((w.q + w.reach - light.rect.xy) / w.texel)), ivec2(0), end);
+    vec2 scale = vec2(end + 1) / (light.rect.zw - light.rect.xy);
+    ivec2 first = clamp(ivec2(floor((w.q - w.reach - light.rect.xy) * scale)), ivec2(0), end);
+    ivec2 last = clamp(ivec2(floor((w.q + w.reach - light.rect.xy) * scale)), ivec2(0), end);
     ivec2 span = last - first + 1;
     float across = float(max(span.x, span.y));
     int coarsest = textureQueryLevels(min_max_pyramid);

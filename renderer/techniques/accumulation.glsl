@@ -29,26 +29,27 @@ void add_patch(vec2 low, vec2 high, float share)
 }
 
 #if P_mode == 0
-void walk_points(PatchWindow w)
+void walk_points(PatchWindow w, float receiver_z)
 {
     // The light as the receiver sees it on the map plane (F4), or the part of it that casters of
     // this window can reach (F3).
-    vec2 reach = P(window) == WINDOW_LIGHT ? light_search_extent(w.receiver_z) : w.reach;
-    reach = max(reach, w.reach);
-    int k = w.answer == LIT ? 0 : int(P(kernel));
+    vec2 reach = w.reach;
+    if (P(window) == WINDOW_LIGHT)
+        reach = max(reach, light_search_extent(receiver_z));
     ivec2 size = textureSize(caster_maps, 0).xy;
+    vec2 to_texels = vec2(size) / (light.rect.zw - light.rect.xy);
     vec2 pitch = 2.0 * reach / float(P(kernel));
+    int k = w.answer == LIT ? 0 : int(P(kernel));
     for (int layer = 0; layer < P(layers); layer++)
         for (int y = 0; y < k; y++)
             for (int x = 0; x < k; x++) {
-                vec2 low = vec2(x, y) * pitch - reach, center = low + 0.5 * pitch;
-                ivec2 at = ivec2(floor((w.q + center - light.rect.xy) / w.texel));
-                bool inside = all(greaterThanEqual(at, ivec2(0))) && all(lessThan(at, size));
-                float d = texelFetch(caster_maps, ivec3(clamp(at, ivec2(0), size - 1), layer), 0).r;
-                float z = light_linear(d);
-                float plane = plane_depth(w.plane, center, w.bias);
-                vec2 scale = 1.0 / (max(light_window_scale(z, w.receiver_z), 1e-20) * w.emitter);
-                if (inside && z < w.receiver_z && d < plane)
+                vec2 low = vec2(x, y) * pitch - reach, middle = low + 0.5 * pitch;
+                vec2 at = (w.q + middle - light.rect.xy) * to_texels;
+                float d = min(at.x, at.y) < 0.0 ? 1.0 : caster_depth(ivec2(max(at, 0.0)), layer);
+                vec2 scale = to_texels * w.texel; // e per metre
+                float plane = min(w.depth + dot(w.gradient, middle * scale), 1.0) - w.bias;
+                scale /= max(w.depth - d, 1e-20);
+                if (d < min(plane, w.depth))
                     add_patch(low * scale, (low + pitch) * scale, 1.0);
             }
 }
@@ -62,7 +63,7 @@ vec4 visibility(Surface s)
     bits_begin(0);
 #endif
 #if P_mode == 0
-    walk_points(w);
+    walk_points(w, s.p.z);
 #else
     walk_patches(w);
     if (w.answer == UMBRA)

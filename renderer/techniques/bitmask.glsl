@@ -46,9 +46,10 @@ vec4 visibility(Surface s)
     walk_patches(w);
     float lit = w.answer == UMBRA ? 0.0 : bits_lit_share();
 #ifdef INTERLEAVED
-    // Width of the window on the screen, F5, for the averaging pass.
+    // Width on the screen, F5, of the sharpest shadow here, for the averaging pass.
     float scale = light.parallel != 0 ? 1.0 : s.p.z / light.near_z;
-    float pixels = 2.0 * w.reach.x * scale * view.eye.w * s.depth / view.forward.w;
+    float width = 2.0 * w.reach.x * min(w.narrowest / w.widest, 1.0);
+    float pixels = width * scale * view.eye.w * s.depth / view.forward.w;
     return vec4(lit, lit < 1.0 ? pixels : 0.0, 0.0, 1.0);
 #elif defined(TEXTURED)
     if (lit == 0.0 || lit == 1.0)

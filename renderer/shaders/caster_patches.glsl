@@ -102,8 +102,9 @@ void walk_quadtree(inout PatchWindow w, int layer, ivec2 root, int root_level, i
     int level = root_level;
     bool walking = true;
     while (walking) {
-        vec3 d = level > 0 ? texelFetch(min_max_pyramid, ivec3(at, layer), level - 1).rgb
-                           : vec3(caster_depth(at, layer));
+        float middle = caster_depth((at << level) + ((1 << level) >> 1), layer);
+        vec3 d = texelFetch(min_max_pyramid, ivec3(at, layer), max(level - 1, 0)).rgb;
+        d = level > 0 ? d : vec3(middle);
         vec2 low = w.origin + vec2(at << level) * w.texel;
         vec2 side = float(1 << level) * w.texel, high = low + side;
         float plane = min(w.depth + dot(w.gradient, low + 0.5 * side), 1.0);
@@ -119,16 +120,13 @@ void walk_quadtree(inout PatchWindow w, int layer, ivec2 root, int root_level, i
         bool beside = any(greaterThan(low, vec2(widest))) || any(lessThan(high, vec2(-widest)));
         bool open = d.x < most && !own && !beside;
         bool leaf = level == finest || (whole && d.y - d.x <= 0.016 * (w.depth - d.y));
-        // A loop, because software rasterisers skip one but not a branch.
-        for (bool patch_here = open && leaf; patch_here; patch_here = false) {
+        if (open && leaf) {
             // Part of a coarse texel: the near depth hides as much as makes the mean of the two
             // depths. Where the plane runs through the texel its middle decides.
             bool mixed = !whole && d.x < least;
             float share = mixed ? (d.y - d.z) / max(d.y - d.x, 1e-20) : 1.0;
             float limit = min(plane - w.bias, w.depth);
-            float depth = whole ? d.z
-                : mixed         ? d.x
-                                : caster_depth((at << level) + ((1 << level) >> 1), layer);
+            float depth = whole ? d.z : mixed ? d.x : middle;
             float below = max(w.depth - depth, 1e-20);
             vec2 a = low / below, b = high / below;
 #if P_fill != 0

@@ -45,8 +45,7 @@ static bool draw_layers(struct technique_run *run, const struct sample_point *po
     for (uint32_t i = 0; ok && i < count; i++) {
         float rect[4];
         light_face_window(run->face, run->light->casters, points[i].at, rect);
-        gl.NamedFramebufferTextureLayer(
-            framebuffer, GL_DEPTH_ATTACHMENT, array->name, 0, (GLint)i);
+        gl.NamedFramebufferTextureLayer(framebuffer, GL_DEPTH_ATTACHMENT, array->name, 0, (GLint)i);
         ok = pass_draw_casters(run, framebuffer, array->width, points[i].at, rect, false, error);
     }
     gl.DeleteFramebuffers(1, &framebuffer);
@@ -65,8 +64,8 @@ static struct batch pending;
 static bool build(struct technique_run *run, const struct shadow_key *key,
     struct shadow_input *input, struct pen_error *error)
 {
-    input->textures[0] = gl_texture_create(
-        GL_DEPTH_COMPONENT32F, key->size, key->size, pending.count, 1);
+    input->textures[0] =
+        gl_texture_create(GL_DEPTH_COMPONENT32F, key->size, key->size, pending.count, 1);
     return draw_layers(run, pending.points, pending.count, &input->textures[0], error);
 }
 

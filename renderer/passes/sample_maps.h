@@ -16,8 +16,9 @@ void sample_points(const struct light_face *face, uint32_t count, struct sample_
 
 /* What the lookup needs per sample; std140 array element. */
 struct sample_map {
-    float at[4];     /* xy: emitter position; z: 1 when the layer is used */
-    float window[4]; /* map uv = l * window.xy + window.zw, l on the map plane seen from the sample */
+    float at[4]; /* xy: emitter position; z: 1 when the layer is used */
+    float
+        window[4]; /* map uv = l * window.xy + window.zw, l on the map plane seen from the sample */
     float emission[4];
 };
 

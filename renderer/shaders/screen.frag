@@ -19,7 +19,7 @@ void main()
         discard;
     if (light.omni != 0 && s.p.z <= light.near_z)
         discard;
-    if (s.p.z <= 0.0 && light.parallel == 0)
+    if (s.p.z <= 0.0 && !light_parallel)
         vis = vec4(0.0);
     else {
         // Coarse facets turn away from the light before the smooth surface that they stand for does:

@@ -46,11 +46,11 @@ static bool add_batch(struct technique_run *run, const struct sample_point *poin
     uint32_t count, bool keep, struct pen_error *error)
 {
     const struct multisample *params = run->params;
-    struct lookup_block block = {.count = {(int32_t)count},
-        .weight = {1.0f / (float)params->samples}};
+    struct lookup_block block = {
+        .count = {(int32_t)count}, .weight = {1.0f / (float)params->samples}};
     const struct gl_texture *maps;
-    if (!pass_sample_maps(run, points + first, count, params->map_size, first, keep, block.samples,
-            &maps, error))
+    if (!pass_sample_maps(
+            run, points + first, count, params->map_size, first, keep, block.samples, &maps, error))
         return false;
     struct pass_texture texture = {UNIT_FREE, maps->name, GL_SAMPLE_NEAREST_BORDER};
     return pass_screen(run,
@@ -79,7 +79,7 @@ static bool record(struct technique_run *run, struct pen_error *error)
         if (!add_batch(run, points, first, n, keep, error))
             return false;
     }
-    
+
     struct pass_texture sum = {UNIT_FREE, run->ctx->sum.name, GL_SAMPLE_NEAREST};
     return pass_screen(run,
         &(struct pass_screen){.name = "multisample resolve",

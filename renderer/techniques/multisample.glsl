@@ -24,7 +24,7 @@ vec4 visibility(Surface s)
         // the origin moved to the sample).
         vec2 l;
         float facing, slope;
-        if (light.parallel != 0) {
+        if (light_parallel) {
             l = s.p.xy + at * s.p.z;
             facing = -(s.n.z - dot(s.n.xy, at));
             slope = 1.0 / (max(facing, 0.02) * range);
@@ -43,7 +43,7 @@ vec4 visibility(Surface s)
 #if P_weighting == 1
         vec3 to = vec3(at, 0.0) - s.p;
         float d2 = dot(to, to);
-        float w = light.parallel != 0 ? max(facing, 0.0) : max(facing, 0.0) * s.p.z / (d2 * d2);
+        float w = light_parallel ? max(facing, 0.0) : max(facing, 0.0) * s.p.z / (d2 * d2);
 #else
         float w = facing > 0.0 ? 1.0 : 0.0;
 #endif

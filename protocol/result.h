@@ -43,6 +43,8 @@ struct pen_result {
     uint32_t class_pixels[3];     /* lit, penumbra, umbra; all 0 when not classified */
     uint32_t full_work_pixels;    /* pixels for which the method ran in full */
     uint32_t triangles_drawn;
+    uint32_t shadow_maps;         /* depth maps of light samples that the image rests on, drawn or kept;
+                                     summed over lights and jittered frames */
     uint64_t gpu_bytes;           /* resident scenes, images and shadow inputs */
     uint64_t image_bytes;         /* encoded size */
 };

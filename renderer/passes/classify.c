@@ -36,13 +36,13 @@ bool pass_fill_umbra(struct technique_run *run, const struct gl_texture *tiles, 
     GLuint program = gl_programs_get(run->ctx->programs, &desc, error);
     if (!program)
         return false;
-    pass_draw_tiles(run->ctx, program, framebuffer, tiles, TILE_UMBRA, run->width,
-        run->height, false);
+    pass_draw_tiles(
+        run->ctx, program, framebuffer, tiles, TILE_UMBRA, run->width, run->height, false);
     return true;
 }
 
-const struct gl_texture *pass_classify(struct technique_run *run, const struct shadow_input *casters,
-    float margin_texels, struct pen_error *error)
+static const struct gl_texture *classify(struct technique_run *run,
+    const struct shadow_input *casters, float margin_texels, bool umbra, struct pen_error *error)
 {
     struct technique_ctx *ctx = run->ctx;
     struct gl_texture *tiles = &ctx->tiles;
@@ -55,10 +55,9 @@ const struct gl_texture *pass_classify(struct technique_run *run, const struct s
     }
     /* Spheres' far sides and textured lights need no zero tiles of their own: 0 is 0 in any colour;
      * but an omnidirectional light lights what lies behind its plane. */
-    struct classify_block block = {.margin = {margin_texels + 1},
-        .tile = {CLASSIFY_TILE, run->face->omni ? 0 : 1}};
-    struct pass_texture textures[] = {
-        {UNIT_DEPTH, run->gbuffer->depth.name, GL_SAMPLE_NEAREST},
+    struct classify_block block = {
+        .margin = {margin_texels + 1}, .tile = {CLASSIFY_TILE, umbra && !run->face->omni ? 1 : 0}};
+    struct pass_texture textures[] = {{UNIT_DEPTH, run->gbuffer->depth.name, GL_SAMPLE_NEAREST},
         {UNIT_MIN_MAX, casters->textures[0].name, GL_SAMPLE_NEAREST}};
     if (!pass_fill(ctx,
             &(struct pass_fill){.name = "classify",
@@ -76,4 +75,16 @@ const struct gl_texture *pass_classify(struct technique_run *run, const struct s
         return NULL;
     count_classes(run, tiles);
     return tiles;
+}
+
+const struct gl_texture *pass_classify(struct technique_run *run,
+    const struct shadow_input *casters, float margin_texels, struct pen_error *error)
+{
+    return classify(run, casters, margin_texels, true, error);
+}
+
+const struct gl_texture *pass_classify_lit(struct technique_run *run,
+    const struct shadow_input *casters, float margin_texels, struct pen_error *error)
+{
+    return classify(run, casters, margin_texels, false, error);
 }

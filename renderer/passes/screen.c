@@ -55,8 +55,7 @@ void pass_draw_tiles(struct technique_ctx *ctx, GLuint program, GLuint framebuff
     const struct gl_texture *tiles, int32_t tile_class, uint32_t width, uint32_t height, bool add)
 {
     gl.BindTextureUnit(UNIT_TILES, tiles->name);
-    gl.ProgramUniform2i(
-        program, gl.GetUniformLocation(program, "tile"), CLASSIFY_TILE, tile_class);
+    gl.ProgramUniform2i(program, gl.GetUniformLocation(program, "tile"), CLASSIFY_TILE, tile_class);
     begin(ctx, program, framebuffer, width, height, add);
     gl.DrawArraysInstanced(GL_TRIANGLE_STRIP, 0, 4, (GLsizei)(tiles->width * tiles->height));
     gl.Disable(GL_BLEND);
@@ -120,4 +119,18 @@ bool pass_fill(struct technique_ctx *ctx, const struct pass_fill *pass, struct p
     gl.DeleteBuffers(1, &extra);
     gl_timer_end(&ctx->timer);
     return true;
+}
+
+GLuint pass_clear_sum(struct technique_run *run)
+{
+    static const float zero[4] = {0};
+    struct technique_ctx *ctx = run->ctx;
+    if (gl_texture_fit(&ctx->sum, GL_RGBA32F, run->width, run->height, 0, 1) ||
+        !ctx->sum_framebuffer) {
+        gl.DeleteFramebuffers(1, &ctx->sum_framebuffer);
+        const struct gl_texture *color = &ctx->sum;
+        ctx->sum_framebuffer = gl_framebuffer_create(&color, 1, NULL);
+    }
+    gl.ClearNamedFramebufferfv(ctx->sum_framebuffer, GL_COLOR, 0, zero);
+    return ctx->sum_framebuffer;
 }

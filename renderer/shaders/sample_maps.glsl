@@ -93,6 +93,8 @@ float sample_lit_box(sampler2DArray maps, vec2 size, SampleMap map, SampledRecei
 {
 #if KERNEL == 1
     return sample_lit(maps, size, map, r, v);
+#elif KERNEL == 2
+    return sample_lit_bilinear(maps, size, map, r, v, vec2(0.0));
 #else
     vec2 low = (v.l * map.window.xy + map.window.zw) * size - 0.5 * float(KERNEL - 1);
     vec2 base = floor(low), f = low - base, metres = 1.0 / (size * map.window.xy);

@@ -45,6 +45,10 @@ struct pass_fill {
 };
 bool pass_fill(struct technique_ctx *ctx, const struct pass_fill *pass, struct pen_error *error);
 
+/* The accumulator ctx->sum (RGBA32F, the size of the picture), cleared to 0: the framebuffer of
+ * passes that add. */
+GLuint pass_clear_sum(struct technique_run *run);
+
 /* Draws the tiles of one class (enum tile_class) of an image of width x height pixels. */
 void pass_draw_tiles(struct technique_ctx *ctx, GLuint program, GLuint framebuffer,
     const struct gl_texture *tiles, int32_t tile_class, uint32_t width, uint32_t height, bool add);

@@ -47,8 +47,7 @@ void pass_penumbra_start(struct technique_run *run, bool next)
         textured ? mean[0] : 1, textured ? mean[1] : 1, textured ? mean[2] : 1, 1};
     int slot = next ? SCRATCH_LIT_NEXT : SCRATCH_LIT;
     for (int i = 0; i < (textured ? 2 : 1); i++)
-        pass_scratch_clear(
-            pass_scratch(run, slot + i, textured ? GL_RGBA16F : GL_RG16F, 1), lit);
+        pass_scratch_clear(pass_scratch(run, slot + i, textured ? GL_RGBA16F : GL_RG16F, 1), lit);
 }
 
 static GLuint make_target(struct technique_run *run, bool next)

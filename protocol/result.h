@@ -46,6 +46,8 @@ struct pen_result {
      * without those that the classifier decided; all 0 for methods that split nothing. */
     uint32_t subdivided_pixels[3];
     uint32_t triangles_drawn;
+    uint32_t shadow_maps; /* depth maps of light samples that the image rests on, drawn or kept;
+                             summed over lights and jittered frames */
     uint64_t rays;        /* of methods that trace */
     uint64_t gpu_bytes;   /* resident scenes, images and shadow inputs */
     uint64_t image_bytes; /* encoded size */

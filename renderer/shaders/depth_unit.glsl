@@ -23,6 +23,7 @@ float depth_unit_to_z(float u)
 struct PlaneInWindow {
     float mean;           // not above the mean of the plane, clamped to far_z, over the window
     float lowest, highest; // bounds of the plane over the window
+    bool clamped;         // the plane reaches beyond far_z there
 };
 
 // `offset`: centre of the window minus the receiver's own position; `extent`: its half size; m on
@@ -38,6 +39,7 @@ PlaneInWindow plane_in_window(ReceiverPlane plane, vec2 offset, vec2 extent, flo
     float over = clamp(center + reach - 1.0, 0.0, 2.0 * reach);
     float mean = min(center - over * over / max(4.0 * reach, 1e-20), 1.0);
     PlaneInWindow r;
+    r.clamped = over > 0.0;
     r.mean = depth_unit(max(mean, 0.0)) - bias;
     r.lowest = depth_unit(clamp(center - reach, 0.0, 1.0)) - bias;
     r.highest = depth_unit(clamp(center + reach, 0.0, 1.0)) - bias;

@@ -42,20 +42,22 @@ vec4 visibility(Surface s)
     // Where the block's corners agree and nothing is in penumbra there is nothing to average.
     float spread = widest;
     for (int i = 0; i < 4; i++) {
-        ivec2 corner = s.pixel + ivec2((i & 1) * 3, (i >> 1) * 3) - 2;
+        ivec2 corner = s.pixel + ivec2((i & 1) * 4, (i >> 1) * 4) - 2;
         vec4 v = load(clamp(corner, ivec2(0), last), width);
         spread = max(spread, max(width, abs(v.a - center.a)));
     }
-    int count = spread > 0.0 ? 16 : 0;
+    // Five by five with halved borders holds every phase once, and has its centre on the pixel.
+    int count = spread > 0.0 ? 25 : 0;
     for (int i = 0; i < count; i++) {
-        ivec2 offset = ivec2(i & 3, i >> 2) - 2;
+        ivec2 offset = ivec2(i % 5, i / 5) - 2;
         ivec2 at = clamp(s.pixel + offset, ivec2(0), last);
         vec4 v = load(at, width);
         float d = texelFetch(g_depth, at, 0).r;
         float same = abs(d - (s.depth + dot(g, vec2(offset)))) < 0.01 * s.depth ? 1.0 : 0.0;
+        same *= (abs(offset.x) == 2 ? 0.5 : 1.0) * (abs(offset.y) == 2 ? 0.5 : 1.0);
         sum += same * v;
         weight += same;
-        widest = max(widest, same * width);
+        widest = max(widest, same > 0.0 ? width : 0.0);
     }
     vec4 mean = weight > 0.0 ? sum / weight : center;
     vec4 v = mix(center, mean, clamp((widest - 2.0) / 4.0, 0.0, 1.0));

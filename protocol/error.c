@@ -23,12 +23,20 @@ const char *pen_code_title(enum pen_code code)
         return "OK";
     case PEN_BAD_REQUEST:
         return "Bad Request";
+    case PEN_UNAUTHORIZED:
+        return "Unauthorized";
     case PEN_NOT_FOUND:
         return "Not Found";
+    case PEN_METHOD_NOT_ALLOWED:
+        return "Method Not Allowed";
     case PEN_NOT_ACCEPTABLE:
         return "Not Acceptable";
+    case PEN_TIMEOUT:
+        return "Request Timeout";
     case PEN_TOO_LARGE:
         return "Content Too Large";
+    case PEN_URI_TOO_LONG:
+        return "URI Too Long";
     case PEN_UNSUPPORTED_MEDIA:
         return "Unsupported Media Type";
     case PEN_UNPROCESSABLE:

@@ -7,9 +7,13 @@
 enum pen_code {
     PEN_OK = 0,
     PEN_BAD_REQUEST = 400,
+    PEN_UNAUTHORIZED = 401,
     PEN_NOT_FOUND = 404,
+    PEN_METHOD_NOT_ALLOWED = 405,
     PEN_NOT_ACCEPTABLE = 406,
+    PEN_TIMEOUT = 408, /* the client was too slow to send its request */
     PEN_TOO_LARGE = 413,
+    PEN_URI_TOO_LONG = 414,
     PEN_UNSUPPORTED_MEDIA = 415,
     PEN_UNPROCESSABLE = 422,
     PEN_TOO_MANY = 429,
@@ -22,7 +26,7 @@ struct pen_error {
     uint32_t code;      /* enum pen_code; PEN_OK: nothing went wrong */
     uint32_t retryable; /* 1: the same request may succeed later */
     char pointer[128];  /* RFC 6901 pointer into the request body, or "" */
-    char message[512];  /* one sentence for the client; never a path or an address of this process */
+    char message[512]; /* one sentence for the client; never a path or an address of this process */
 };
 
 /* Fills *e (which may be NULL) and returns false, so that a caller can `return pen_fail(...)`.

@@ -13,34 +13,42 @@ bool frame_output_needs_beauty(const struct pen_request *r)
 bool frame_output_needs_visibility(const struct pen_request *r)
 {
     return r->output.layer == PEN_LAYER_VISIBILITY || r->output.layer == PEN_LAYER_PENUMBRA ||
-        r->output.layer == PEN_LAYER_ALL;
+           r->output.layer == PEN_LAYER_ALL;
 }
 
-static enum pen_pixel pixel_of(const struct pen_output *output)
+static enum pen_pixel pixel_of(const struct pen_output *output, uint32_t layer)
 {
+    /* Half floats would cut depth and position to three digits. */
+    bool metres = layer == PEN_LAYER_DEPTH || layer == PEN_LAYER_POSITION;
     if (output->format == PEN_EXR)
-        return output->bit_depth == 32 ? PEN_PIXEL_RGBA32F : PEN_PIXEL_RGBA16F;
+        return output->bit_depth == 32 || (metres && !output->bit_depth) ? PEN_PIXEL_RGBA32F
+                                                                         : PEN_PIXEL_RGBA16F;
     return output->bit_depth == 16 ? PEN_PIXEL_RGBA32F : PEN_PIXEL_RGBA8;
 }
 
 bool frame_output_is_direct(const struct pen_request *r)
 {
     return r->output.layer == PEN_LAYER_BEAUTY && r->antialias == 1 &&
-        pixel_of(&r->output) == PEN_PIXEL_RGBA8;
+           pixel_of(&r->output, PEN_LAYER_BEAUTY) == PEN_PIXEL_RGBA8;
 }
 
 static const GLenum internal_formats[] = {GL_RGBA8, GL_RGBA16F, GL_RGBA32F};
 static const GLenum read_types[] = {GL_UNSIGNED_BYTE, GL_HALF_FLOAT, GL_FLOAT};
 static const size_t pixel_bytes[] = {4, 8, 16};
 
-void frame_output_fit(struct frame_targets *t, const struct pen_request *r)
+static void fit_color(struct frame_targets *t, const struct pen_request *r, enum pen_pixel pixel)
 {
-    GLenum format = internal_formats[pixel_of(&r->output)];
+    GLenum format = internal_formats[pixel];
     if (!gl_texture_fit(&t->color, format, r->width, r->height, 0, 1) && t->color_framebuffer)
         return;
     gl.DeleteFramebuffers(1, &t->color_framebuffer);
     const struct gl_texture *color = &t->color;
     t->color_framebuffer = gl_framebuffer_create(&color, 1, NULL);
+}
+
+void frame_output_fit(struct frame_targets *t, const struct pen_request *r)
+{
+    fit_color(t, r, pixel_of(&r->output, r->output.layer));
 }
 
 struct output_block {
@@ -59,8 +67,8 @@ static void make_block(const struct frame_job *job, const struct view *view, str
         distance += (center[i] - view->eye[i]) * view->forward[i];
     }
     b->bounds_min[3] = fmaxf(distance - radius, 0);
-    b->bounds_max[3] = distance + radius > b->bounds_min[3] ? distance + radius
-                                                            : b->bounds_min[3] + radius;
+    b->bounds_max[3] =
+        distance + radius > b->bounds_min[3] ? distance + radius : b->bounds_min[3] + radius;
 }
 
 static bool convert(const struct frame_job *job, const struct output_block *block, uint32_t layer,
@@ -89,15 +97,15 @@ static bool convert(const struct frame_job *job, const struct output_block *bloc
         error);
 }
 
-static void read_plane(const struct frame_job *job, enum pen_pixel pixel, uint32_t layer,
-    struct pen_frame *frame)
+static void read_plane(
+    const struct frame_job *job, enum pen_pixel pixel, uint32_t layer, struct pen_frame *frame)
 {
     struct pen_plane *plane = &frame->planes[frame->plane_count++];
     snprintf(plane->name, sizeof plane->name, "%s", pen_layer_names[layer]);
     plane->pixel = pixel;
-    plane->channels = layer == PEN_LAYER_DEPTH || layer == PEN_LAYER_PENUMBRA ? 1
-        : layer == PEN_LAYER_VISIBILITY && pixel != PEN_PIXEL_RGBA8         ? 4
-                                                                            : 3;
+    plane->channels = layer == PEN_LAYER_DEPTH || layer == PEN_LAYER_PENUMBRA     ? 1
+                      : layer == PEN_LAYER_VISIBILITY && pixel != PEN_PIXEL_RGBA8 ? 4
+                                                                                  : 3;
     plane->data = malloc((size_t)frame->width * frame->height * pixel_bytes[pixel]);
     if (!plane->data)
         abort();
@@ -113,7 +121,6 @@ bool frame_output_read(const struct frame_job *job, const struct view *view,
     struct pen_frame *frame, struct pen_error *error)
 {
     const struct pen_request *r = job->request;
-    enum pen_pixel pixel = pixel_of(&r->output);
     bool raw = r->output.format == PEN_EXR;
     struct output_block block;
     memset(frame, 0, sizeof *frame);
@@ -122,6 +129,9 @@ bool frame_output_read(const struct frame_job *job, const struct view *view,
     for (uint32_t layer = 0; layer < PEN_LAYER_ALL; layer++) {
         if (r->output.layer != PEN_LAYER_ALL && r->output.layer != layer)
             continue;
+        enum pen_pixel pixel = pixel_of(&r->output, layer);
+        if (!frame_output_is_direct(r))
+            fit_color(job->targets, r, pixel);
         if (!frame_output_is_direct(r) && !convert(job, &block, layer, raw, error)) {
             pen_frame_finish(frame);
             return false;

@@ -28,7 +28,7 @@
     F(DELETETEXTURES, DeleteTextures) F(DELETEVERTEXARRAYS, DeleteVertexArrays) \
     F(DEPTHFUNC, DepthFunc) F(DEPTHMASK, DepthMask) F(DISABLE, Disable) \
     F(DISPATCHCOMPUTE, DispatchCompute) F(DISPATCHCOMPUTEINDIRECT, DispatchComputeIndirect) \
-    F(DRAWARRAYS, DrawArrays) F(DRAWARRAYSINDIRECT, DrawArraysIndirect) \
+    F(DRAWARRAYS, DrawArrays) F(DRAWARRAYSINSTANCED, DrawArraysInstanced) F(DRAWARRAYSINDIRECT, DrawArraysIndirect) \
     F(ENABLE, Enable) F(ENABLEVERTEXARRAYATTRIB, EnableVertexArrayAttrib) F(ENDQUERY, EndQuery) \
     F(FENCESYNC, FenceSync) F(CLIENTWAITSYNC, ClientWaitSync) \
     F(FINISH, Finish) F(FLUSH, Flush) F(FRONTFACE, FrontFace) \

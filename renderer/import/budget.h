@@ -5,11 +5,11 @@
 
 #define IMP_MAX_JSON_BYTES (512u << 20) /* data URIs count */
 #define IMP_MAX_JSON_DEPTH 64
-#define IMP_MAX_JSON_VALUES (6u << 20)
+#define IMP_MAX_JSON_VALUES 10000000u /* about 100 bytes each */
 
 #define IMP_MAX_ZIP_BYTES (1ull << 30)       /* unpacked, all entries together */
-#define IMP_MAX_ZIP_RATIO 200                /* of an entry that unpacks to more than ... */
-#define IMP_ZIP_RATIO_FROM_BYTES (16u << 20) /* ... this */
+#define IMP_MAX_ZIP_RATIO 200                /* unpacked to packed, of a zip that unpacks to ... */
+#define IMP_ZIP_RATIO_FROM_BYTES (16u << 20) /* ... more than this */
 
 #define IMP_MAX_NODES 1000000u
 #define IMP_MAX_NODE_DEPTH 1024u
@@ -20,8 +20,11 @@
 #define IMP_MAX_LIGHTS 1024u /* uses of a light; of a camera likewise */
 #define IMP_MAX_INDICES                                                                            \
     96000000ull /* after strips and fans are unrolled, all primitives together */
-#define IMP_MAX_VERTICES 16000000ull         /* used by some index, all primitives together */
-#define IMP_MAX_ACCESSOR 96000000u           /* elements of one POSITION accessor, used or not */
+#define IMP_MAX_VERTICES 16000000ull /* used by some index, all primitives together */
+#define IMP_MAX_ACCESSOR 96000000u   /* elements of one POSITION accessor, used or not */
+#define IMP_MAX_OPTIMISER_WORK                                                                     \
+    8000000000ull                            /* see optimise.c; a plain mesh takes 36 per corner   \
+                                              */
 #define IMP_MAX_MESHOPT_BYTES (512ull << 20) /* unpacked, all views together */
 
 #define IMP_MAX_IMAGES 4096u

@@ -16,6 +16,7 @@ struct imp_context {
     struct psc_builder *builder;
 
     uint64_t index_count, vertex_count, instance_count; /* against budget.h */
+    uint64_t optimiser_work;                            /* what is left of IMP_MAX_OPTIMISER_WORK */
     uint32_t light_count, camera_count;
 
     uint32_t *primitives; /* psc number of each glTF primitive, or one of the two below */
@@ -54,6 +55,9 @@ bool imp_convert(struct imp_document *document, struct gltf_model *model,
  * nothing to draw. Errors: PEN_UNPROCESSABLE, PEN_TOO_LARGE. */
 bool imp_primitive(
     struct imp_context *context, uint32_t primitive, uint32_t *psc, struct pen_error *error);
+
+/* A look at all counts before any vertex is read. Errors: PEN_TOO_LARGE. */
+bool imp_primitives_fit(const struct gltf_model *model, struct pen_error *error);
 
 /* material.c: the psc material of a glTF material (-1: the default one). */
 uint32_t imp_material(struct imp_context *context, int32_t material);

@@ -23,7 +23,6 @@ struct imp_files {
     struct imp_file *items;
     uint32_t count;
     struct zip *zip;
-    uint64_t unpacked_bytes;
 };
 
 /* Reads the table of a bundle (bundle.h) or zip; the data must outlive *files. On failure *files is
@@ -44,7 +43,7 @@ const struct imp_file *imp_files_document(struct imp_files *files, struct pen_er
  * not uploaded. */
 bool imp_files_resolve(struct imp_files *files, const char *base, const char *uri,
     const char *pointer, struct imp_bytes *found, struct pen_error *error);
-/* Unpacks the file when needed. Errors: PEN_TOO_LARGE (zip bomb), PEN_UNPROCESSABLE (damaged). */
+/* Unpacks the file when needed. Errors: PEN_UNPROCESSABLE (damaged). */
 bool imp_files_load(struct imp_files *files, const struct imp_file *file, struct imp_bytes *found,
     struct pen_error *error);
 

@@ -402,9 +402,14 @@ void parse(const char *text, size_t bytes, tinygltf::Model &model, struct pen_er
     loader.SetImageLoader(load_no_image, nullptr);
     std::string failure, warning;
     if (!loader.LoadASCIIFromString(
-            &model, &failure, &warning, text, static_cast<unsigned int>(bytes), ""))
-        pen_fail(error, PEN_UNPROCESSABLE, "", "The glTF cannot be read: %s.",
-            imp_text(failure.substr(0, failure.find_first_of(".\n")).c_str()).s);
+            &model, &failure, &warning, text, static_cast<unsigned int>(bytes), "")) {
+        failure = failure.substr(0, failure.find('\n'));
+        size_t code_end = failure.find("] "); /* of "[json.exception.parse_error.101] " */
+        if (failure.rfind("[json", 0) == 0 && code_end != std::string::npos)
+            failure = failure.substr(code_end + 2);
+        pen_fail(error, PEN_UNPROCESSABLE, "", "The glTF cannot be read: %s",
+            imp_text(failure.c_str()).s);
+    }
 }
 
 } // namespace

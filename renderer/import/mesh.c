@@ -60,6 +60,18 @@ static void unroll(struct imp_geometry *g, const struct corners *corners, uint32
     g->index_count = out;
 }
 
+static bool too_many_vertices(struct pen_error *error)
+{
+    return pen_fail(
+        error, PEN_TOO_LARGE, "", "The scene has more than %llu vertices.", IMP_MAX_VERTICES);
+}
+
+static bool too_many_triangles(struct pen_error *error)
+{
+    return pen_fail(
+        error, PEN_TOO_LARGE, "", "The scene has more than %llu triangles.", IMP_MAX_INDICES / 3);
+}
+
 static bool read_triangles(struct imp_context *context, struct imp_geometry *g,
     const struct gltf_primitive *primitive, uint32_t vertex_count, struct pen_error *error)
 {
@@ -75,11 +87,12 @@ static bool read_triangles(struct imp_context *context, struct imp_geometry *g,
             return pen_fail(error, PEN_UNPROCESSABLE, pointer,
                 "glTF %s: indices must be unsigned integers.", pointer);
         corners.count = corners.indices.count;
+    } else if (vertex_count > IMP_MAX_VERTICES - context->vertex_count) {
+        return too_many_vertices(error);
     }
     uint64_t most = primitive->mode == TRIANGLES ? corners.count : 3 * (uint64_t)corners.count;
     if (most > IMP_MAX_INDICES - context->index_count)
-        return pen_fail(error, PEN_TOO_LARGE, "", "The scene has more than %llu triangles.",
-            IMP_MAX_INDICES / 3);
+        return too_many_triangles(error);
     unroll(g, &corners, primitive->mode);
     context->index_count += g->index_count;
     for (uint32_t i = 0; i < g->index_count; i++)
@@ -195,7 +208,7 @@ static bool add(struct imp_context *context, uint32_t number, struct imp_geometr
             bounds->min[k] = fminf(bounds->min[k], g->positions[i][k]);
             bounds->max[k] = fmaxf(bounds->max[k], g->positions[i][k]);
         }
-    imp_geometry_optimise(g);
+    imp_geometry_optimise(g, &context->optimiser_work);
     const struct psc_mesh mesh = {.positions = (const float(*)[3])g->positions,
         .normals = (const float(*)[3])g->normals,
         .tangents = (const float(*)[4])g->tangents,
@@ -244,4 +257,21 @@ bool imp_primitive(
     imp_geometry_finish(&g);
     *psc = context->primitives[number];
     return done;
+}
+
+bool imp_primitives_fit(const struct gltf_model *model, struct pen_error *error)
+{
+    uint64_t corners = 0, vertices = 0;
+    for (uint32_t i = 0; i < model->primitive_count; i++) {
+        const struct gltf_primitive *primitive = &model->primitives[i];
+        int32_t counted = primitive->indices >= 0 ? primitive->indices : primitive->position;
+        if (primitive->mode < TRIANGLES || (uint32_t)counted >= model->accessor_count)
+            continue;
+        uint64_t count = model->accessors[counted].count;
+        corners += primitive->mode == TRIANGLES ? count : 3 * count;
+        vertices += primitive->indices >= 0 ? 0 : count;
+    }
+    if (corners > IMP_MAX_INDICES)
+        return too_many_triangles(error);
+    return vertices <= IMP_MAX_VERTICES || too_many_vertices(error);
 }

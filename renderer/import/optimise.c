@@ -87,12 +87,33 @@ static void build_meshlets(struct imp_geometry *g)
     free(triangles);
 }
 
-void imp_geometry_optimise(struct imp_geometry *g)
+/* The optimisers below look at all neighbours of a vertex, and at all triangles of a place, for
+ * each of its triangles: their work grows with the sum of squares of how many corners meet at a
+ * place. */
+static uint64_t crowding(const struct imp_geometry *g, unsigned *remap)
+{
+    size_t places = meshopt_generateVertexRemap(
+        remap, g->indices, g->index_count, g->positions, g->vertex_count, sizeof *g->positions);
+    uint32_t *corners = imp_alloc(places, sizeof *corners);
+    for (uint32_t i = 0; i < g->index_count; i++)
+        corners[remap[g->indices[i]]]++;
+    uint64_t sum = 0;
+    for (size_t i = 0; i < places; i++)
+        sum += (uint64_t)corners[i] * corners[i];
+    free(corners);
+    return sum;
+}
+
+void imp_geometry_optimise(struct imp_geometry *g, uint64_t *work)
 {
     unsigned *remap = imp_alloc(g->vertex_count, sizeof *remap);
     weld(g, remap);
-    meshopt_optimizeVertexCache(g->indices, g->indices, g->index_count, g->vertex_count);
-    build_meshlets(g);
+    uint64_t crowd = crowding(g, remap);
+    if (crowd <= *work) {
+        *work -= crowd;
+        meshopt_optimizeVertexCache(g->indices, g->indices, g->index_count, g->vertex_count);
+        build_meshlets(g);
+    }
     size_t used =
         meshopt_optimizeVertexFetchRemap(remap, g->indices, g->index_count, g->vertex_count);
     apply_remap(g, remap, used);

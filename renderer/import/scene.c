@@ -44,6 +44,7 @@ bool imp_convert(struct imp_document *document, struct gltf_model *model,
     struct imp_context context = {.document = document,
         .model = model,
         .builder = builder,
+        .optimiser_work = IMP_MAX_OPTIMISER_WORK,
         .primitives = not_yet(model->primitive_count),
         .materials = not_yet((size_t)model->material_count + 1),
         .textures = not_yet(2 * (size_t)model->texture_count),
@@ -65,7 +66,7 @@ bool imp_convert(struct imp_document *document, struct gltf_model *model,
         imp_warn(&context, "Animations are not played: nodes stay where the file puts them.");
         psc_builder_set_animations(builder, document->animation_count);
     }
-    if (!imp_add_nodes(&context, error))
+    if (!imp_primitives_fit(model, error) || !imp_add_nodes(&context, error))
         goto fail;
     imp_material(&context, -1); /* a blob has at least one material */
     if (!context.instance_count)

@@ -1,4 +1,6 @@
 #include "renderer/passes/passes.h"
+#include "renderer/passes/classify.h"
+#include <stdio.h>
 
 static void bind_textures(
     struct technique_ctx *ctx, const struct pass_texture *textures, uint32_t count)
@@ -27,7 +29,7 @@ static GLuint bind_extra(const void *extra, uint32_t bytes)
     return buffer;
 }
 
-static void draw(struct technique_ctx *ctx, GLuint program, GLuint framebuffer, uint32_t width,
+static void begin(struct technique_ctx *ctx, GLuint program, GLuint framebuffer, uint32_t width,
     uint32_t height, bool add)
 {
     gl.BindFramebuffer(GL_FRAMEBUFFER, framebuffer);
@@ -39,18 +41,36 @@ static void draw(struct technique_ctx *ctx, GLuint program, GLuint framebuffer, 
         gl.Enable(GL_BLEND);
         gl.BlendFunc(GL_ONE, GL_ONE);
     }
+}
+
+static void draw(struct technique_ctx *ctx, GLuint program, GLuint framebuffer, uint32_t width,
+    uint32_t height, bool add)
+{
+    begin(ctx, program, framebuffer, width, height, add);
     gl.DrawArrays(GL_TRIANGLES, 0, 3);
-    if (add)
-        gl.Disable(GL_BLEND);
+    gl.Disable(GL_BLEND);
+}
+
+void pass_draw_tiles(struct technique_ctx *ctx, GLuint program, GLuint framebuffer,
+    const struct gl_texture *tiles, int32_t tile_class, uint32_t width, uint32_t height, bool add)
+{
+    gl.BindTextureUnit(UNIT_TILES, tiles->name);
+    gl.ProgramUniform2i(program, gl.GetUniformLocation(program, "tile"), CLASSIFY_TILE, tile_class);
+    begin(ctx, program, framebuffer, width, height, add);
+    gl.DrawArraysInstanced(GL_TRIANGLE_STRIP, 0, 4, (GLsizei)(tiles->width * tiles->height));
+    gl.Disable(GL_BLEND);
 }
 
 bool pass_screen(struct technique_run *run, const struct pass_screen *pass, struct pen_error *error)
 {
     struct technique_ctx *ctx = run->ctx;
-    struct gl_program_desc desc = {.vertex = "screen.vert",
+    char defines[1024];
+    snprintf(defines, sizeof defines, "#define LIGHT_SHAPE %d\n#define LIGHT_PARALLEL %d\n%s",
+        run->face->shape, run->face->parallel, pass->defines ? pass->defines : "");
+    struct gl_program_desc desc = {.vertex = pass->tiles ? "tiles.vert" : "screen.vert",
         .fragment = "screen.frag",
         .body = pass->body,
-        .defines = pass->defines,
+        .defines = defines,
         .info = &run->technique->info,
         .params = run->params};
     GLuint program = gl_programs_get(ctx->programs, &desc, error);
@@ -67,8 +87,12 @@ bool pass_screen(struct technique_run *run, const struct pass_screen *pass, stru
     }
     bind_textures(ctx, pass->textures, pass->texture_count);
     GLuint extra = bind_extra(pass->extra, pass->extra_bytes);
-    draw(ctx, program, pass->framebuffer ? pass->framebuffer : run->vis_framebuffer, run->width,
-        run->height, pass->add);
+    GLuint framebuffer = pass->framebuffer ? pass->framebuffer : run->vis_framebuffer;
+    if (pass->tiles)
+        pass_draw_tiles(ctx, program, framebuffer, pass->tiles, TILE_UNDECIDED, run->width,
+            run->height, pass->add);
+    else
+        draw(ctx, program, framebuffer, run->width, run->height, pass->add);
     unbind_samplers(pass->textures, pass->texture_count);
     gl.BindSampler(UNIT_EMISSION, 0);
     gl.BindSampler(UNIT_SHADOW, 0);
@@ -95,4 +119,18 @@ bool pass_fill(struct technique_ctx *ctx, const struct pass_fill *pass, struct p
     gl.DeleteBuffers(1, &extra);
     gl_timer_end(&ctx->timer);
     return true;
+}
+
+GLuint pass_clear_sum(struct technique_run *run)
+{
+    static const float zero[4] = {0};
+    struct technique_ctx *ctx = run->ctx;
+    if (gl_texture_fit(&ctx->sum, GL_RGBA32F, run->width, run->height, 0, 1) ||
+        !ctx->sum_framebuffer) {
+        gl.DeleteFramebuffers(1, &ctx->sum_framebuffer);
+        const struct gl_texture *color = &ctx->sum;
+        ctx->sum_framebuffer = gl_framebuffer_create(&color, 1, NULL);
+    }
+    gl.ClearNamedFramebufferfv(ctx->sum_framebuffer, GL_COLOR, 0, zero);
+    return ctx->sum_framebuffer;
 }

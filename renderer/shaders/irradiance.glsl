@@ -9,32 +9,24 @@ float angle_over_sine(float cosine)
     return cosine >= 0.0 ? f : 3.14159265 * inversesqrt(max(1.0 - x * x, 1e-7)) - f;
 }
 
-// Lambert's formula, one edge between unit vectors a and b: its angle times the component of its
-// plane's normal along n.
+// Lambert's formula, one edge from a to b: its angle times the component of its plane's normal
+// along n. One root serves both ends.
 float edge_integral(vec3 a, vec3 b, vec3 n)
 {
-    return dot(cross(a, b), n) * angle_over_sine(clamp(dot(a, b), -1.0, 1.0));
+    float r = inversesqrt(max(dot(a, a) * dot(b, b), 1e-30));
+    return dot(cross(a, b), n) * r * angle_over_sine(clamp(dot(a, b) * r, -1.0, 1.0));
 }
 
-// Adds the edge a-b clipped at the horizon; remembers where the polygon leaves and enters.
-void add_edge(vec3 a, vec3 b, vec3 n, inout float sum, inout vec3 leave, inout vec3 enter)
+// The edge a-b without its part below the horizon; remembers where the polygon leaves and enters.
+// Selections instead of branches: software rasterisers run both sides of a branch anyway.
+float clipped_edge(vec3 a, vec3 b, float da, float db, vec3 n, inout vec3 leave, inout vec3 enter)
 {
-    float da = dot(a, n), db = dot(b, n);
-    if (da <= 0.0 && db <= 0.0)
-        return;
-    vec3 cut = a + (b - a) * (da / (da - db));
-    if (da < 0.0)
-        enter = a = cut;
-    if (db < 0.0)
-        leave = b = cut;
-    sum += edge_integral(normalize(a), normalize(b), n);
-}
-
-float close_polygon(float sum, vec3 leave, vec3 enter, vec3 n)
-{
-    if (leave != vec3(0.0) && enter != vec3(0.0))
-        sum += edge_integral(normalize(leave), normalize(enter), n);
-    return 0.5 * abs(sum);
+    float across = da - db;
+    vec3 cut = a + (b - a) * (da / (abs(across) > 1e-20 ? across : 1e-20));
+    leave = da >= 0.0 && db < 0.0 ? cut : leave;
+    enter = da < 0.0 && db >= 0.0 ? cut : enter;
+    float e = edge_integral(da < 0.0 ? cut : a, db < 0.0 ? cut : b, n);
+    return max(da, db) < 0.0 ? 0.0 : e;
 }
 
 float irradiance_rect(vec3 p, vec3 n, vec3 center, vec3 half_x, vec3 half_y)
@@ -42,22 +34,13 @@ float irradiance_rect(vec3 p, vec3 n, vec3 center, vec3 half_x, vec3 half_y)
     vec3 to = center - p;
     vec3 a = to - half_x - half_y, b = to + half_x - half_y;
     vec3 c = to + half_x + half_y, d = to - half_x + half_y;
-    float low = min(min(dot(a, n), dot(b, n)), min(dot(c, n), dot(d, n)));
-    vec3 ua = normalize(a), ub = normalize(b), uc = normalize(c), ud = normalize(d);
-    float e = 0.5 * abs(edge_integral(ua, ub, n) + edge_integral(ub, uc, n) +
-        edge_integral(uc, ud, n) + edge_integral(ud, ua, n));
-    // Clipping runs as a loop of dynamic length: software rasterisers skip it where no lane needs it.
-    int clipped = low < 0.0 ? 1 : 0;
-    for (int i = 0; i < clipped; i++) {
-        vec3 leave = vec3(0.0), enter = vec3(0.0);
-        float sum = 0.0;
-        add_edge(a, b, n, sum, leave, enter);
-        add_edge(b, c, n, sum, leave, enter);
-        add_edge(c, d, n, sum, leave, enter);
-        add_edge(d, a, n, sum, leave, enter);
-        e = close_polygon(sum, leave, enter, n);
-    }
-    return e;
+    vec4 above = vec4(dot(a, n), dot(b, n), dot(c, n), dot(d, n));
+    vec3 leave = vec3(0.0), enter = vec3(0.0);
+    float sum = clipped_edge(a, b, above.x, above.y, n, leave, enter) +
+        clipped_edge(b, c, above.y, above.z, n, leave, enter) +
+        clipped_edge(c, d, above.z, above.w, n, leave, enter) +
+        clipped_edge(d, a, above.w, above.x, n, leave, enter);
+    return 0.5 * abs(sum + edge_integral(leave, enter, n)); // the cut closes along the horizon
 }
 
 // A disk as the regular polygon of the same area.
@@ -66,14 +49,16 @@ float irradiance_disk(vec3 p, vec3 n, vec3 center, vec3 half_x, vec3 half_y)
     const int sides = 12;
     const float widen = sqrt(3.14159265 / (0.5 * float(sides) * sin(6.2831853 / float(sides))));
     vec3 c = center - p, leave = vec3(0.0), enter = vec3(0.0), from = c + widen * half_x;
-    float sum = 0.0;
+    float sum = 0.0, below = dot(from, n);
     for (int i = 1; i <= sides; i++) {
         float t = 6.2831853 * float(i) / float(sides);
         vec3 to = c + widen * (cos(t) * half_x + sin(t) * half_y);
-        add_edge(from, to, n, sum, leave, enter);
+        float above = dot(to, n);
+        sum += clipped_edge(from, to, below, above, n, leave, enter);
         from = to;
+        below = above;
     }
-    return close_polygon(sum, leave, enter, n);
+    return 0.5 * abs(sum + edge_integral(leave, enter, n));
 }
 
 // A sphere, with the part below the horizon cut (Snyder 1996, area light sources).

@@ -18,13 +18,23 @@ layout(std140, binding = 1) uniform LightBlock {
 
 const int SHAPE_RECT = 0, SHAPE_DISK = 1;
 
+// What never changes within a pass is a constant of the program where the pass defines it: software
+// rasterisers run both sides of every branch.
+#ifdef LIGHT_SHAPE
+const int light_shape = LIGHT_SHAPE;
+const bool light_parallel = LIGHT_PARALLEL != 0;
+#else
+#define light_shape light.shape
+#define light_parallel (light.parallel != 0)
+#endif
+
 layout(binding = 5) uniform sampler2D emission_texture; // of the light, with mips
 layout(binding = 6) uniform sampler2D shadow_map;       // hardware depth, border 1
 
 // F1: where the map shows light-space point p, metres on the map plane.
 vec2 light_project(vec3 p)
 {
-    return light.parallel != 0 ? p.xy : p.xy * (light.near_z / p.z);
+    return light_parallel ? p.xy : p.xy * (light.near_z / p.z);
 }
 
 vec2 light_uv(vec2 l)
@@ -41,12 +51,12 @@ vec2 light_texel(sampler2D map) // m per texel on the map plane
 float light_depth(float z)
 {
     float t = (z - light.near_z) / (light.far_z - light.near_z);
-    return light.parallel != 0 ? t : t * light.far_z / z;
+    return light_parallel ? t : t * light.far_z / z;
 }
 
 float light_linear(float d)
 {
-    return light.parallel != 0
+    return light_parallel
         ? mix(light.near_z, light.far_z, d)
         : light.near_z * light.far_z / (light.far_z - d * (light.far_z - light.near_z));
 }
@@ -55,13 +65,13 @@ float light_linear(float d)
 float light_depth_slope(float z)
 {
     float range = light.far_z - light.near_z;
-    return light.parallel != 0 ? 1.0 / range : light.near_z * light.far_z / (range * z * z);
+    return light_parallel ? 1.0 / range : light.near_z * light.far_z / (range * z * z);
 }
 
 // F2: W(c_z); the light point hidden by map position l is (l - q) / W.
 float light_window_scale(float caster_z, float receiver_z)
 {
-    return light.parallel != 0 ? receiver_z - caster_z
+    return light_parallel ? receiver_z - caster_z
                                : light.near_z * (receiver_z - caster_z) / (receiver_z * caster_z);
 }
 
@@ -74,7 +84,7 @@ vec2 light_filter_extent(float caster_z, float receiver_z)
 vec2 light_search_extent(float receiver_z)
 {
     float z = max(receiver_z - light.near_z, 0.0);
-    return light.extent * (light.parallel != 0 ? z : z / receiver_z);
+    return light.extent * (light_parallel ? z : z / receiver_z);
 }
 
 // F6, the receiver's own plane in the map: hardware depth is linear over the map plane, so the
@@ -89,7 +99,7 @@ ReceiverPlane receiver_plane(vec3 p, vec3 n)
     ReceiverPlane plane;
     float range = light.far_z - light.near_z;
     plane.depth = light_depth(p.z);
-    if (light.parallel != 0) {
+    if (light_parallel) {
         float nz = n.z < 0.0 ? min(n.z, -0.02) : max(n.z, 0.02);
         plane.gradient = -n.xy / (nz * range);
     } else {
@@ -111,8 +121,8 @@ float plane_depth(ReceiverPlane plane, vec2 offset, float bias)
 bool light_is_above_horizon(vec3 p, vec3 n)
 {
     vec2 across = abs(n.xy) * light.extent;
-    float reach = light.shape == SHAPE_DISK ? light.extent.x * length(n.xy) : across.x + across.y;
-    return (light.parallel != 0 ? -n.z : -dot(n, p)) + reach > 0.0;
+    float reach = light_shape == SHAPE_DISK ? light.extent.x * length(n.xy) : across.x + across.y;
+    return (light_parallel ? -n.z : -dot(n, p)) + reach > 0.0;
 }
 
 // Emission at emitter position s in [-1, 1]^2, averaged over a square of `size` (2: all of it). The

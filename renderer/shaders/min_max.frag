@@ -10,7 +10,9 @@ layout(location = 0) out vec2 range;
 vec2 load(ivec2 at, int level)
 {
 #ifdef FROM_DEPTH
-    return vec2(light_linear(texelFetch(source, at, level).r));
+    // Where nothing is there is no depth, not even for receivers beyond the map's far plane.
+    float d = texelFetch(source, at, level).r;
+    return vec2(d < 1.0 ? light_linear(d) : 1e30);
 #else
     return texelFetch(source, at, level).rg;
 #endif

@@ -29,7 +29,7 @@ vec2 min_max_size()
 #endif
 
 // Bounds of the map's linear depth over the window q +- extent (m on the map plane), from at most
-// 2 x 2 texels of the level that is coarse enough. Outside the map nothing occludes: far_z.
+// 2 x 2 texels of the level that is coarse enough. Where nothing is: 1e30.
 vec2 min_max_window(vec2 q, vec2 extent)
 {
     vec2 size = min_max_size();

@@ -1,5 +1,6 @@
 // Direct light of all lights times their visibility, plus ambient and emission. RESOLVE: there is
-// one frame only, so the display curve is applied here.
+// one frame only, so the display curve is applied here. LIGHTS is a constant: unrolled, each light's
+// uniforms are read once for all pixels instead of gathered per pixel.
 #include "view.glsl"
 #include "octahedral.glsl"
 #include "irradiance.glsl"
@@ -23,7 +24,6 @@ struct ShadeLight {
     vec4 radiance; // w: area, m^2
 };
 layout(std140, binding = 3) uniform ShadeBlock {
-    ivec4 count;
     ShadeLight lights[8];
 } shade;
 
@@ -49,10 +49,17 @@ vec3 specular_brdf(Material m, vec3 n, vec3 v, vec3 l, float spread)
 }
 
 #if defined(HAS_RECT) || defined(HAS_ROUND)
-// Quadrature of the specular part over the emitter: k x k cells, fewer for rough surfaces.
+// Quadrature of the specular part over the emitter, k x k cells. Scenes without glossy materials get
+// by with four. The loop has a constant length: a dynamic one costs software rasterisers more than
+// the samples it saves.
 vec3 specular_area(Material m, ShadeLight s, vec3 p, vec3 n, vec3 v)
 {
-    int type = int(s.origin.w), k = m.alpha > 0.25 ? 2 : 4;
+    int type = int(s.origin.w);
+#ifdef GLOSSY
+    const int k = 4;
+#else
+    const int k = 2;
+#endif
     vec3 half_x = s.half_x.xyz, half_y = s.half_y.xyz, axis = s.z.xyz;
 #ifdef HAS_ROUND
     if (type == SPHERE) { // the disk that faces the receiver
@@ -64,8 +71,7 @@ vec3 specular_area(Material m, ShadeLight s, vec3 p, vec3 n, vec3 v)
 #endif
     float cell = (type == RECT ? 4.0 : 3.14159265) * length(half_x) * length(half_y) / float(k * k);
     vec3 sum = vec3(0.0);
-    int count = m.f0 == vec3(0.0) ? 0 : k * k;
-    for (int i = 0; i < count; i++) {
+    for (int i = 0; i < k * k; i++) {
         vec2 u = (vec2(i % k, i / k) + 0.5) * (2.0 / float(k)) - 1.0;
 #ifdef HAS_ROUND
         if (type != RECT) { // concentric map of Shirley and Chiu
@@ -153,11 +159,9 @@ void main()
 #ifdef EMIT
     sum += texelFetch(g_emission, pixel, 0).rgb;
 #endif
-    for (int i = 0; i < shade.count.x; i++) {
+    for (int i = 0; i < LIGHTS; i++) {
         vec3 t = texelFetch(visibility_maps, ivec3(pixel, i), 0).rgb;
-        // Not an if: a loop of dynamic length skips shadowed pixels on software rasterisers too.
-        int lit = hit && t != vec3(0.0) ? 1 : 0;
-        for (int k = 0; k < lit; k++)
+        if (hit && t != vec3(0.0))
             sum += t * shade.lights[i].radiance.rgb * reflected(m, shade.lights[i], p, n, v);
     }
     if (albedo.a == 0.0) { // the ground fades into the background, so that it has no edge

@@ -1,10 +1,16 @@
+#include "horizon.glsl"
 layout(binding = 7) uniform sampler2D accumulated;
 
 vec4 visibility(Surface s)
 {
     vec4 sum = texelFetch(accumulated, s.pixel, 0);
     // A textured light's mean visibility is that of its luminance: there is no fifth channel.
+#if P_weighting == 0
+    // a: the share of the light above the horizon.
+    sum.rgb /= horizon_weight(sum.a);
+#else
     sum.rgb /= max(sum.a, 1e-20);
+#endif
     if (light.textured == 0)
         return scalar_visibility(sum.r);
     const vec3 luminance = vec3(0.2126, 0.7152, 0.0722);

@@ -1,3 +1,4 @@
+#include "renderer/passes/classify.h"
 #include "renderer/passes/interleave.h"
 #include "renderer/passes/passes.h"
 #include "renderer/techniques/map_params.h"
@@ -32,11 +33,16 @@ static bool record(struct technique_run *run, struct pen_error *error)
     if (!map || !min_max)
         return false;
     struct pass_texture pyramid = {UNIT_MIN_MAX, min_max->textures[0].name, GL_SAMPLE_NEAREST};
+    const struct gl_texture *tiles = NULL;
+    if (run->request->classify.on &&
+        !(tiles = pass_classify(run, min_max, params->min_filter + 1, error)))
+        return false;
     struct pass_screen pass = {.name = "pcss",
         .body = "pcss.glsl",
         .shadow = &map->textures[0],
         .textures = &pyramid,
-        .texture_count = 1};
+        .texture_count = 1,
+        .tiles = tiles};
     return params->smooth.on ? pass_interleaved(run, &pass, error) : pass_screen(run, &pass, error);
 }
 

@@ -13,7 +13,7 @@ Taps taps_begin(int count, vec2 shift)
     Taps t;
     t.index = shift.y;
     t.inverse_count = 1.0 / float(count);
-    if (light.shape == SHAPE_DISK) {
+    if (light_shape == SHAPE_DISK) {
         float angle = 6.2831853 * shift.x;
         t.at = vec2(cos(angle), sin(angle));
     } else {
@@ -25,7 +25,7 @@ Taps taps_begin(int count, vec2 shift)
 vec2 taps_next(inout Taps t)
 {
     vec2 p;
-    if (light.shape == SHAPE_DISK) {
+    if (light_shape == SHAPE_DISK) {
         p = t.at * sqrt(t.index * t.inverse_count);
         t.at = mat2(-0.73736888, 0.67549029, -0.67549029, -0.73736888) * t.at; // golden angle
     } else {

@@ -78,6 +78,10 @@ int main(int argc, char **argv)
     for (uint32_t i = 0; i < result.pass_count; i++)
         printf("%-10s %-22s x%-3u %8.2f ms\n", pen_stage_names[result.passes[i].stage],
             result.passes[i].name, result.passes[i].count, (double)result.passes[i].ms);
+    printf("class pixels %u %u %u, full work %u, triangles %u\n", result.class_pixels[0],
+        result.class_pixels[1], result.class_pixels[2], result.full_work_pixels,
+        result.triangles_drawn);
+    printf("sample maps %u\n", result.shadow_maps);
     for (uint32_t i = 0; i < result.warning_count; i++)
         printf("warning: %s\n", result.warnings[i]);
     if (!pen_encode(&frame, &request.output, NULL, 0, &bytes, &error))

@@ -1,0 +1,24 @@
+/* Which 8 x 8 tiles of the image are certainly lit, certainly in umbra, or undecided, from the
+ * min-max pyramid of the casters. Conservative for methods that compare depths of that map inside
+ * the windows F3 and F4: skipping decided tiles changes no pixel. */
+#pragma once
+#include "renderer/passes/passes.h"
+
+#define CLASSIFY_TILE 8 /* px */
+
+enum tile_class { TILE_LIT, TILE_UNDECIDED, TILE_UMBRA, TILE_EMPTY };
+
+/* Classifies run's face and writes 0 to the umbra tiles of vis. `margin_texels`: how far beyond the
+ * filter windows the method may look. Adds the pixels to run->result->class_pixels. The answer is
+ * valid until the next call; pass it to pass_screen as `tiles`. */
+const struct gl_texture *pass_classify(struct technique_run *run,
+    const struct shadow_input *casters, float margin_texels, struct pen_error *error);
+
+/* The same without umbra: for methods that look from other points of the emitter, which may see
+ * between casters that hide each other from its centre. */
+const struct gl_texture *pass_classify_lit(struct technique_run *run,
+    const struct shadow_input *casters, float margin_texels, struct pen_error *error);
+
+/* Writes 0 to the umbra tiles of another target, such as a method's scratch. */
+bool pass_fill_umbra(struct technique_run *run, const struct gl_texture *tiles, GLuint framebuffer,
+    struct pen_error *error);

@@ -1,0 +1,90 @@
+// One fragment per tile. Every receiver of the tile lies in the frustum slab between the tile's
+// nearest and farthest depth; its image in light space bounds q and r_z of all of them.
+#include "surface.glsl"
+#include "min_max.glsl"
+layout(std140, binding = 3) uniform ClassifyBlock {
+    vec4 margin; // x: texels of the full map
+    ivec4 tile;  // x: px
+} classify;
+layout(location = 0) out vec4 tile_class; // class / 255
+
+const float LIT = 0.0, UNDECIDED = 1.0, UMBRA = 2.0, EMPTY = 3.0;
+
+float classify_tile(ivec2 first, ivec2 size)
+{
+    ivec2 end = min(first + classify.tile.x, size);
+    float low = 1e30, high = 0.0;
+    for (int y = first.y; y < end.y; y++)
+        for (int x = first.x; x < end.x; x++) {
+            float d = texelFetch(g_depth, ivec2(x, y), 0).r;
+            low = min(low, d == 0.0 ? low : d);
+            high = max(high, d);
+        }
+    if (high == 0.0)
+        return EMPTY;
+    // Corners of the slab, half a pixel wider than the pixel centres are.
+    vec2 ndc_low = pixel_to_ndc(first) - vec2(1.0, -1.0) * view.viewport.zw;
+    vec2 ndc_high = pixel_to_ndc(end - 1) + vec2(1.0, -1.0) * view.viewport.zw;
+    vec2 q_low = vec2(1e30), q_high = vec2(-1e30);
+    float near_z = 1e30, far_z = -1e30;
+    for (int i = 0; i < 8; i++) {
+        vec2 ndc = vec2((i & 1) != 0 ? ndc_high.x : ndc_low.x, (i & 2) != 0 ? ndc_high.y : ndc_low.y);
+        vec3 p = unproject(light.clip_to_light, ndc, (i & 4) != 0 ? high : low);
+        near_z = min(near_z, p.z);
+        far_z = max(far_z, p.z);
+        if (light.parallel == 0 && p.z <= light.near_z)
+            return UNDECIDED; // beside or behind the light: nothing to project
+        vec2 q = light_project(p);
+        q_low = min(q_low, q);
+        q_high = max(q_high, q);
+    }
+    // A cube face only owns receivers inside its pyramid.
+    if (light.cube != 0)
+        return UNDECIDED;
+    vec2 texel = (light.rect.zw - light.rect.xy) / vec2(2 * textureSize(min_max_pyramid, 0));
+    vec2 center = 0.5 * (q_low + q_high), spread = 0.5 * (q_high - q_low) + classify.margin.x * texel;
+    vec2 search = light_search_extent(far_z) + spread;
+    float slack = 1e-4 * far_z;
+
+    // Cells of the search window, at most 8 x 8 of one level. A cell matters when its nearest depth
+    // is in front of the receivers and the filter window of that depth (F3) reaches the cell.
+    vec2 size0 = vec2(textureSize(min_max_pyramid, 0));
+    vec2 low_uv = clamp(light_uv(center - search), 0.0, 1.0);
+    vec2 high_uv = clamp(light_uv(center + search), 0.0, 1.0);
+    vec2 span = (high_uv - low_uv) * size0;
+    int level = int(ceil(log2(max(max(span.x, span.y) / 7.0, 1.0))));
+    ivec2 last = max(ivec2(size0) >> level, ivec2(1)) - 1;
+    vec2 scale = size0 * exp2(-float(level));
+    ivec2 a = clamp(ivec2(low_uv * scale), ivec2(0), last);
+    ivec2 b = clamp(ivec2(high_uv * scale), ivec2(0), last);
+    vec2 cell = (light.rect.zw - light.rect.xy) / scale, reach = vec2(0.0);
+    bool blocked = false;
+    for (int y = a.y; y <= b.y; y++)
+        for (int x = a.x; x <= b.x; x++) {
+            float z = texelFetch(min_max_pyramid, ivec2(x, y), level).r;
+            // The last cell of an odd level also holds the leftover column or row.
+            vec2 extra = vec2(x == last.x ? cell.x : 0.0, y == last.y ? cell.y : 0.0);
+            vec2 middle = light.rect.xy + (vec2(x, y) + 0.5) * cell + 0.5 * extra;
+            vec2 gap = abs(middle - center) - 0.5 * (cell + extra) - spread;
+            vec2 window = light_filter_extent(min(z, far_z), far_z);
+            if (z < far_z + slack && all(lessThanEqual(gap, window))) {
+                blocked = true;
+                reach = max(reach, window);
+            }
+        }
+    if (!blocked)
+        return LIT;
+    // In umbra every texel of every window blocks: the windows must not reach over the map's border,
+    // where nothing is, and lie wholly in front of the nearest receiver.
+    vec2 window = reach + spread;
+    bool inside = all(greaterThan(center - window, light.rect.xy)) &&
+        all(lessThan(center + window, light.rect.zw));
+    bool dark = min_max_window(center, window).y < near_z * 0.98 - slack;
+    return inside && dark && classify.tile.y != 0 ? UMBRA : UNDECIDED;
+}
+
+void main()
+{
+    ivec2 size = ivec2(view.viewport.xy);
+    tile_class = vec4(classify_tile(ivec2(gl_FragCoord.xy) * classify.tile.x, size) / 255.0);
+}

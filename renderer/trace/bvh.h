@@ -1,0 +1,61 @@
+/* A bounding volume hierarchy over a scene's triangles, built on the CPU without any library and
+ * laid out for a shader: both arrays go into storage buffers as they are (std430).
+ *
+ *   struct Node     { vec3 low;    uint first;       vec3 high; uint count;       };  // 32 bytes
+ *   struct Triangle { vec3 corner; uint flags;       vec3 edge1; uint instance;
+ *                     vec3 edge2;  uint first_index; };                               // 48 bytes
+ *
+ * Node 0 is the root. count 0: an inner node whose children are nodes first and first + 1; else a
+ * leaf of triangles first .. first + count - 1. A stack of PEN_BVH_STACK entries is enough for a
+ * traversal that pushes the farther child. pen_bvh_occluded is the traversal to copy in GLSL. */
+#pragma once
+#include "renderer/blob/pscene.h"
+
+#define PEN_BVH_STACK 32
+#define PEN_BVH_LEAF 4 /* triangles at most */
+
+struct pen_bvh_node {
+    float low[3];
+    uint32_t first;
+    float high[3];
+    uint32_t count;
+};
+
+enum pen_bvh_flags {
+    PEN_BVH_TWO_SIDED = 1, /* a hit on the back counts too */
+    PEN_BVH_ALPHA = 2,     /* the material's alpha decides: look up the texture */
+    PEN_BVH_SWAPPED = 4,   /* mirrored instance: corners 1 and 2 are exchanged, so that the front
+                              is where corner, edge1, edge2 run counter-clockwise */
+};
+
+struct pen_bvh_triangle {
+    float corner[3]; /* world, m */
+    uint32_t flags;  /* enum pen_bvh_flags */
+    float edge1[3];
+    uint32_t instance; /* of PSC_INSTANCES */
+    float edge2[3];
+    uint32_t first_index; /* of the triangle in PSC_INDICES */
+};
+
+struct pen_bvh {
+    struct pen_bvh_node *nodes;         /* at least one: an empty scene has an empty leaf */
+    struct pen_bvh_triangle *triangles; /* in leaf order */
+    uint32_t node_count, triangle_count;
+    uint32_t depth; /* of the deepest leaf, root 0; below PEN_BVH_STACK */
+    float cost;     /* expected node and triangle tests of a ray that hits the root box */
+};
+
+/* All instances' triangles. Binned surface-area heuristic (Wald 2007), one thread: about one second
+ * per million triangles. Errors: PEN_TOO_LARGE above `max_triangles` (0: 2^26). */
+bool pen_bvh_build_scene(const struct psc_scene *scene, uint64_t max_triangles, struct pen_bvh *bvh,
+    struct pen_error *error);
+/* The same over `count` triangles of the caller's, which are copied. */
+bool pen_bvh_build(const struct pen_bvh_triangle *triangles, uint32_t count, struct pen_bvh *bvh,
+    struct pen_error *error);
+void pen_bvh_finish(struct pen_bvh *bvh); /* harmless on a zeroed one */
+
+/* Whether a triangle lies on origin + t direction, 0 < t < limit, under the rule of shadows: a
+ * single-sided triangle counts when its front faces along the direction, that is the light. Alpha
+ * is not looked at. */
+bool pen_bvh_occluded(
+    const struct pen_bvh *bvh, const float origin[3], const float direction[3], float limit);

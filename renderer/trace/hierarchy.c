@@ -1,0 +1,188 @@
+/* Embree's hierarchies, one per light, kept between calls. */
+#include "renderer/trace/internal.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* On which side of a triangle's plane the light lies: 1 all in front, 0 across, -1 all behind. */
+static int side_of(const struct trace_silhouette *light, const float corner[3][3])
+{
+    float e1[3], e2[3], n[3], to[3];
+    for (int c = 0; c < 3; c++) {
+        e1[c] = corner[1][c] - corner[0][c];
+        e2[c] = corner[2][c] - corner[0][c];
+        to[c] = light->shape == TRACE_PARALLEL ? light->center[c] : light->center[c] - corner[0][c];
+    }
+    trace_cross(e1, e2, n);
+    float middle = trace_dot(n, to), reach = 0, length = sqrtf(trace_dot(n, n));
+    float a = trace_dot(n, light->a), b = trace_dot(n, light->b);
+    switch (light->shape) {
+    case TRACE_EYE:
+        return 0;
+    case TRACE_SQUARE:
+        reach = fabsf(a) + fabsf(b);
+        break;
+    case TRACE_ROUND:
+    case TRACE_PARALLEL:
+        reach = sqrtf(a * a + b * b);
+        break;
+    case TRACE_BALL:
+        reach = light->a[0] * length;
+        break;
+    }
+    /* Rounding must not settle what the filter would decide otherwise. */
+    reach += 1e-5f * length * sqrtf(trace_dot(to, to));
+    return middle > reach ? 1 : middle < -reach ? -1 : 0;
+}
+
+static int side_of_triangle(const struct pen_trace_scene *scene, enum trace_group group,
+    uint32_t triangle, const struct trace_silhouette *light)
+{
+    const uint32_t *index = scene->indices[group][triangle];
+    float corner[3][3];
+    for (int k = 0; k < 3; k++)
+        memcpy(corner[k], scene->positions[group][index[k]], sizeof corner[k]);
+    return side_of(light, corner);
+}
+
+static bool add_geometry(struct pen_trace_scene *scene, struct trace_hierarchy *h,
+    enum trace_geometry id, const float (*positions)[3], uint32_t vertices,
+    const uint32_t (*indices)[3], uint32_t triangles, struct pen_error *error)
+{
+    if (triangles == 0)
+        return true;
+    RTCGeometry geometry = rtcNewGeometry(scene->device, RTC_GEOMETRY_TYPE_TRIANGLE);
+    if (!geometry)
+        return trace_check_device(scene, error);
+    h->geometries[id] = geometry;
+    rtcSetSharedGeometryBuffer(
+        geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, positions, 0, 12, vertices);
+    rtcSetSharedGeometryBuffer(
+        geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, indices, 0, 12, triangles);
+    if (id == TRACE_GEOMETRY_MIXED) {
+        rtcSetGeometryOccludedFilterFunction(geometry, trace_filter_facing_shadow);
+        rtcSetGeometryIntersectFilterFunction(geometry, trace_filter_facing_primary);
+    } else if (id == TRACE_GEOMETRY_ALPHA) {
+        rtcSetGeometryUserData(geometry, &h->filter);
+        rtcSetGeometryOccludedFilterFunction(geometry, trace_filter_alpha_shadow);
+        rtcSetGeometryIntersectFilterFunction(geometry, trace_filter_alpha_primary);
+    }
+    rtcCommitGeometry(geometry);
+    rtcAttachGeometryByID(h->scene, geometry, id);
+    h->triangles += triangles;
+    if (id == TRACE_GEOMETRY_MIXED || id == TRACE_GEOMETRY_ALPHA)
+        h->filtered += triangles;
+    return trace_check_device(scene, error);
+}
+
+static bool add_group(struct pen_trace_scene *scene, struct trace_hierarchy *h,
+    enum trace_geometry id, enum trace_group group, uint32_t triangles, struct pen_error *error)
+{
+    uint32_t(*indices)[3] = h->indices[id] ? h->indices[id] : scene->indices[group];
+    return add_geometry(scene, h, id, (const float(*)[3])scene->positions[group],
+        scene->vertex_count[group], (const uint32_t(*)[3])indices, triangles, error);
+}
+
+/* Fills the subsets that can cast for a light. */
+static bool cull(struct pen_trace_scene *scene, struct trace_hierarchy *h,
+    uint32_t counts[TRACE_GEOMETRIES], struct pen_error *error)
+{
+    uint32_t facing = scene->triangle_count[TRACE_FACING];
+    uint32_t alpha = scene->triangle_count[TRACE_ALPHA];
+    uint32_t(*front)[3] = malloc((facing + 1) * sizeof *front);
+    uint32_t(*mixed)[3] = malloc((facing + 1) * sizeof *mixed);
+    uint32_t(*leaves)[3] = malloc((alpha + 1) * sizeof *leaves);
+    h->indices[TRACE_GEOMETRY_FRONT] = front;
+    h->indices[TRACE_GEOMETRY_MIXED] = mixed;
+    h->indices[TRACE_GEOMETRY_ALPHA] = leaves;
+    h->alpha_triangles = malloc((alpha + 1) * sizeof *h->alpha_triangles);
+    if (!front || !mixed || !leaves || !h->alpha_triangles)
+        return pen_fail(error, PEN_INTERNAL, "", "Out of memory.");
+    h->bytes = (uint64_t)facing * 24 + (uint64_t)alpha * 16;
+    atomic_fetch_add(&scene->bytes, (int64_t)h->bytes);
+    for (uint32_t i = 0; i < facing; i++) {
+        int side = side_of_triangle(scene, TRACE_FACING, i, &h->light);
+        uint32_t geometry = side > 0 ? TRACE_GEOMETRY_FRONT : TRACE_GEOMETRY_MIXED;
+        if (side >= 0)
+            memcpy(h->indices[geometry][counts[geometry]++], scene->indices[TRACE_FACING][i],
+                sizeof *front);
+    }
+    for (uint32_t i = 0; i < alpha; i++) {
+        const struct trace_alpha_material *m = &scene->alpha.table[scene->alpha.materials[i]];
+        if (!m->two_sided && side_of_triangle(scene, TRACE_ALPHA, i, &h->light) < 0)
+            continue;
+        h->alpha_triangles[counts[TRACE_GEOMETRY_ALPHA]] = i;
+        memcpy(
+            leaves[counts[TRACE_GEOMETRY_ALPHA]++], scene->indices[TRACE_ALPHA][i], sizeof *leaves);
+    }
+    return true;
+}
+
+/* Embree's medium quality: the high one builds three times as long and traces no faster here. */
+static bool build(struct pen_trace_scene *scene, struct trace_hierarchy *h, struct pen_error *error)
+{
+    uint32_t counts[TRACE_GEOMETRIES] = {
+        [TRACE_GEOMETRY_TWO_SIDED] = scene->triangle_count[TRACE_TWO_SIDED],
+        [TRACE_GEOMETRY_MIXED] = scene->triangle_count[TRACE_FACING],
+        [TRACE_GEOMETRY_ALPHA] = scene->triangle_count[TRACE_ALPHA]};
+    if (h->light.shape != TRACE_EYE) {
+        counts[TRACE_GEOMETRY_MIXED] = counts[TRACE_GEOMETRY_ALPHA] = 0;
+        if (!cull(scene, h, counts, error))
+            return false;
+    }
+    h->filter = (struct trace_filter){&scene->alpha, h->alpha_triangles};
+    h->scene = rtcNewScene(scene->device);
+    if (!h->scene)
+        return trace_check_device(scene, error);
+    static const uint8_t group_of[] = {[TRACE_GEOMETRY_TWO_SIDED] = TRACE_TWO_SIDED,
+        [TRACE_GEOMETRY_FRONT] = TRACE_FACING,
+        [TRACE_GEOMETRY_MIXED] = TRACE_FACING,
+        [TRACE_GEOMETRY_ALPHA] = TRACE_ALPHA};
+    for (uint32_t id = 0; id < TRACE_GEOMETRY_GROUND; id++)
+        if (!add_group(scene, h, id, group_of[id], counts[id], error))
+            return false;
+    if (scene->has_ground &&
+        !add_geometry(scene, h, TRACE_GEOMETRY_GROUND, (const float(*)[3])scene->ground, 4,
+            (const uint32_t(*)[3])scene->ground_indices, 2, error))
+        return false;
+    rtcCommitScene(h->scene);
+    scene->builds++;
+    return trace_check_device(scene, error);
+}
+
+const struct trace_hierarchy *trace_hierarchy_get(
+    struct pen_trace_scene *scene, const struct trace_silhouette *light, struct pen_error *error)
+{
+    struct trace_hierarchy *oldest = &scene->hierarchies[0];
+    for (uint32_t i = 0; i < TRACE_HIERARCHIES; i++) {
+        struct trace_hierarchy *h = &scene->hierarchies[i];
+        if (h->last_use && !memcmp(&h->light, light, sizeof *light)) {
+            h->last_use = ++scene->clock;
+            return h;
+        }
+        if (h->last_use < oldest->last_use)
+            oldest = h;
+    }
+    trace_hierarchy_finish(scene, oldest);
+    oldest->light = *light;
+    if (!build(scene, oldest, error)) {
+        trace_hierarchy_finish(scene, oldest);
+        return NULL;
+    }
+    oldest->last_use = ++scene->clock;
+    return oldest;
+}
+
+void trace_hierarchy_finish(struct pen_trace_scene *scene, struct trace_hierarchy *h)
+{
+    for (uint32_t id = 0; id < TRACE_GEOMETRIES; id++) {
+        if (h->geometries[id])
+            rtcReleaseGeometry(h->geometries[id]);
+        free(h->indices[id]);
+    }
+    if (h->scene)
+        rtcReleaseScene(h->scene);
+    free(h->alpha_triangles);
+    atomic_fetch_sub(&scene->bytes, (int64_t)h->bytes);
+    memset(h, 0, sizeof *h);
+}

@@ -1,0 +1,149 @@
+/* What the files of this folder share. */
+#pragma once
+#include "renderer/trace/trace.h"
+#include <embree3/rtcore.h>
+#include <stdatomic.h>
+
+/* The scene's triangles by what decides whether a hit on them counts. */
+enum trace_group {
+    TRACE_TWO_SIDED, /* nothing: it does */
+    TRACE_FACING,    /* the side that was hit */
+    TRACE_ALPHA,     /* a texture or vertex alpha, and the side when single-sided */
+    TRACE_GROUPS
+};
+
+/* Geometry ids within a hierarchy. */
+enum trace_geometry {
+    TRACE_GEOMETRY_TWO_SIDED,
+    TRACE_GEOMETRY_FRONT, /* of TRACE_FACING, for shadows: those that face the whole light */
+    TRACE_GEOMETRY_MIXED, /* those whose plane cuts the light; for primary rays all of them */
+    TRACE_GEOMETRY_ALPHA,
+    TRACE_GEOMETRY_GROUND,
+    TRACE_GEOMETRIES
+};
+
+struct trace_range { /* where an instance's triangles went */
+    uint32_t first_triangle, instance;
+};
+
+struct trace_alpha_material {
+    const uint8_t *texels; /* alpha of the finest level; NULL: 1 */
+    uint32_t width, height, wrap_s, wrap_t;
+    bool nearest, blend, two_sided, prepared;
+    uint8_t texel_low, texel_high;
+    float factor, cutoff;
+};
+
+struct trace_alpha {
+    uint32_t (*indices)[3]; /* those of TRACE_ALPHA */
+    float (*uv)[2];         /* base texture coordinates, transform applied; per vertex */
+    float *vertex_alpha;    /* per vertex */
+    uint32_t *materials;    /* per triangle, into `table` */
+    struct trace_alpha_material *table; /* one per blob material; unused ones are zero */
+    uint8_t **images;                   /* one per blob image; NULL where unused */
+    uint32_t image_count;
+};
+
+/* What decides on which side of a triangle's plane a light lies: its centre (sun: the direction to
+ * it) and half axes. */
+struct trace_silhouette {
+    enum { TRACE_EYE, TRACE_SQUARE, TRACE_ROUND, TRACE_BALL, TRACE_PARALLEL } shape;
+    float center[3], a[3], b[3]; /* BALL: the radius in a[0] */
+};
+
+/* One of Embree's hierarchies over the scene. For shadows it leaves out what can never count: the
+ * triangles of single-sided materials that turn their back to every point of the light. */
+struct trace_hierarchy {
+    RTCScene scene;
+    RTCGeometry geometries[TRACE_GEOMETRIES];
+    uint32_t (*indices[TRACE_GEOMETRIES])[3]; /* own subsets; NULL: all of a group */
+    uint32_t *alpha_triangles; /* of the subset's triangles, the number in TRACE_ALPHA */
+    struct trace_filter {
+        const struct trace_alpha *alpha;
+        const uint32_t *triangles; /* alpha_triangles, or NULL: the same */
+    } filter;
+    struct trace_silhouette light; /* what it was made for */
+    uint64_t last_use;             /* 0: unused slot */
+    uint64_t bytes;                /* of the subsets */
+    uint64_t filtered, triangles;
+};
+
+#define TRACE_HIERARCHIES (PEN_MAX_LIGHTS + 1) /* kept at most */
+
+struct pen_trace_scene {
+    RTCDevice device;
+    float (
+        *positions[TRACE_GROUPS])[3]; /* world; one more than counted, as Embree reads 16 bytes */
+    uint32_t (*indices[TRACE_GROUPS])[3];
+    uint32_t vertex_count[TRACE_GROUPS], triangle_count[TRACE_GROUPS];
+    struct trace_range *ranges[TRACE_GROUPS];
+    uint32_t range_count[TRACE_GROUPS];
+    struct trace_alpha alpha;
+    bool has_ground;
+    float ground[5][3]; /* corners, and one for Embree */
+    uint32_t ground_indices[2][3];
+    float extent; /* largest absolute coordinate, without the ground */
+    struct trace_hierarchy hierarchies[TRACE_HIERARCHIES];
+    uint64_t builds;
+    uint64_t clock; /* counts uses */
+    uint64_t max_bytes;
+    _Atomic int64_t bytes; /* everything */
+    atomic_bool over_budget;
+    struct pen_trace_scene_info info;
+};
+
+/* The context of a query: Embree's own first, so that filters can cast back. */
+struct trace_context {
+    struct RTCIntersectContext embree;
+    uint32_t salt; /* makes stochastic alpha of one sample differ from that of the next */
+};
+
+/* Filters: shadow rays run from the receiver to the light, primary rays from the eye. */
+void trace_filter_facing_shadow(const struct RTCFilterFunctionNArguments *args);
+void trace_filter_facing_primary(const struct RTCFilterFunctionNArguments *args);
+void trace_filter_alpha_shadow(const struct RTCFilterFunctionNArguments *args);
+void trace_filter_alpha_primary(const struct RTCFilterFunctionNArguments *args);
+
+/* The hierarchy for a light or, TRACE_EYE, for primary rays; made when there is none yet. */
+const struct trace_hierarchy *trace_hierarchy_get(
+    struct pen_trace_scene *scene, const struct trace_silhouette *light, struct pen_error *error);
+void trace_hierarchy_finish(struct pen_trace_scene *scene, struct trace_hierarchy *hierarchy);
+/* False, with *error filled, when Embree complains or the budget is spent. */
+bool trace_check_device(struct pen_trace_scene *scene, struct pen_error *error);
+
+/* Alpha at a point of triangle `primitive`; u, v as Embree gives them. */
+float trace_alpha_at(const struct trace_alpha *alpha, uint32_t primitive, float u, float v);
+
+static inline uint32_t trace_hash(uint32_t x)
+{
+    x ^= x >> 16;
+    x *= 0x7feb352du;
+    x ^= x >> 15;
+    x *= 0x846ca68bu;
+    return x ^ (x >> 16);
+}
+
+/* Fills xs and ys with points [first, first + count) of an Owen-scrambled Sobol sequence as 32-bit
+ * fractions, count a power of two that divides first: a (0, log2 count, 2)-net in base 2. Points
+ * 2k and 2k + 1 share one of count / 2 equal cells of the unit square, and cells are in order. */
+bool trace_samples_net(uint32_t first, uint32_t count, uint32_t seed, uint32_t *xs, uint32_t *ys);
+
+/* Calls work(context, item) for every item below `count` on `threads` threads, the caller's among
+ * them, with denormals flushed. Adds their processor time to *cpu_seconds. */
+void trace_parallel(uint32_t threads, uint32_t count, void (*work)(void *context, uint32_t item),
+    void *context, double *cpu_seconds);
+/* `threads`, or how many this process may use when that is 0. */
+uint32_t trace_thread_count(uint32_t threads);
+double trace_seconds(void);
+
+static inline float trace_dot(const float a[3], const float b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+static inline void trace_cross(const float a[3], const float b[3], float out[3])
+{
+    out[0] = a[1] * b[2] - a[2] * b[1];
+    out[1] = a[2] * b[0] - a[0] * b[2];
+    out[2] = a[0] * b[1] - a[1] * b[0];
+}

@@ -1,0 +1,443 @@
+/* A job over an image of receivers: tiles, the pre-test, and when to stop. */
+#include "renderer/trace/packet.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define TILE 16 /* receivers along an edge; a multiple of 4 */
+#define TILE_RECEIVERS (TILE * TILE)
+#define MAX_SAMPLES 65536u
+#define FIRST_BLOCK 256u /* samples before a receiver may stop early */
+#define MAX_BLOCKS 16
+#define PRETEST_NET 16u
+#define PRETEST_RIM 4u
+#define DEFAULT_DILATION 4u
+
+enum verdict { NO_RECEIVER, UMBRA, LIT, MIXED };
+
+struct run {
+    const struct pen_trace_scene *scene;
+    const struct pen_trace_job *job;
+    const struct pen_trace_result *result;
+    struct trace_emitter emitter;
+    float mean_emission[3];
+    uint32_t mode; /* enum trace_mode */
+    uint32_t samples, low_bits, pretest_low_bits, position_stride, normal_stride;
+    int32_t *points; /* u then v of all samples, then of the pre-test */
+    struct trace_block blocks[MAX_BLOCKS], pretest, rim;
+    uint32_t block_count;
+    uint8_t *verdicts; /* adaptive: enum verdict per receiver */
+    uint8_t *full;     /* adaptive: 1 where all samples are wanted */
+    uint32_t tiles_x, tile_width, tile_height;
+    _Atomic uint64_t rays, receivers, full_receivers;
+    atomic_bool late;
+};
+
+struct tile {
+    uint32_t x0, y0, x1, y1;
+};
+
+static struct tile tile_of(const struct run *run, uint32_t item)
+{
+    const struct pen_trace_job *job = run->job;
+    struct tile t = {item % run->tiles_x * run->tile_width, item / run->tiles_x * run->tile_height};
+    t.x1 = t.x0 + run->tile_width < job->width ? t.x0 + run->tile_width : job->width;
+    t.y1 = t.y0 + run->tile_height < job->height ? t.y0 + run->tile_height : job->height;
+    return t;
+}
+
+/* Reads receiver `pixel`; false when it is none. */
+static bool read_receiver(const struct run *run, uint32_t pixel, struct trace_receiver *out)
+{
+    const float *p = run->job->positions + (size_t)pixel * run->position_stride;
+    const float *n = run->job->normals + (size_t)pixel * run->normal_stride;
+    float length = sqrtf(trace_dot(n, n));
+    if (!(length > 0) || !isfinite(length + p[0] + p[1] + p[2]))
+        return false;
+    float largest = fmaxf(fmaxf(fabsf(p[0]), fabsf(p[1])), fabsf(p[2])), distance2 = 0;
+    for (int c = 0; c < 3; c++)
+        distance2 += (p[c] - run->job->eye[c]) * (p[c] - run->job->eye[c]);
+    float rounding = 0x1p-18f * fmaxf(largest, 0.25f * run->scene->extent);
+    out->bias = fmaxf(fmaxf(run->job->bias, rounding), run->job->depth_error * sqrtf(distance2));
+    for (int c = 0; c < 3; c++) {
+        out->position[c] = p[c];
+        out->normal[c] = n[c] / length;
+    }
+    out->pixel = pixel;
+    return true;
+}
+
+/* A tile's receivers in blocks of 4 x 4 (rows when the job is a list), so that sixteen in a row are
+ * close together. `full` not NULL: only those it marks. */
+static uint32_t gather(const struct run *run, struct tile t, const uint8_t *full,
+    struct trace_receiver receivers[TILE_RECEIVERS])
+{
+    uint32_t count = 0, step = run->tile_height == 1 ? 1 : 4;
+    uint32_t across = run->tile_height == 1 ? run->tile_width : 4;
+    for (uint32_t by = t.y0; by < t.y1; by += step)
+        for (uint32_t bx = t.x0; bx < t.x1; bx += across)
+            for (uint32_t y = by; y < by + step && y < t.y1; y++)
+                for (uint32_t x = bx; x < bx + across && x < t.x1; x++) {
+                    uint32_t pixel = y * run->job->width + x;
+                    if ((!full || full[pixel]) && read_receiver(run, pixel, &receivers[count]))
+                        count++;
+                }
+    return count;
+}
+
+static void store(const struct run *run, uint32_t pixel, const float rgb[3], float visible,
+    float error, uint32_t samples)
+{
+    if (run->result->visibility) {
+        memcpy(run->result->visibility + 4 * (size_t)pixel, rgb, 3 * sizeof *rgb);
+        run->result->visibility[4 * (size_t)pixel + 3] = visible;
+    }
+    if (run->result->standard_error)
+        run->result->standard_error[pixel] = error;
+    if (run->result->samples)
+        run->result->samples[pixel] = samples;
+}
+
+/* What one receiver has gathered over its blocks. */
+struct total {
+    uint32_t samples, count;
+    double weight, visible, rgb[3], pairs;
+};
+
+static void add_sums(
+    const struct run *run, struct total *t, const struct trace_sums *sums, int lane, uint32_t n)
+{
+    bool weights = run->mode & TRACE_WEIGHTS, colour = run->mode & TRACE_COLOUR;
+    t->samples += n;
+    t->count += sums->count[lane];
+    t->pairs += sums->pairs[lane];
+    t->weight += weights ? sums->weight[lane] : n;
+    t->visible += weights ? sums->visible[lane] : sums->count[lane];
+    for (int c = 0; c < 3; c++)
+        t->rgb[c] += colour    ? (double)sums->rgb[c][lane]
+                     : weights ? (double)sums->visible[lane]
+                               : sums->count[lane];
+}
+
+/* Standard error of the mean: see pen_trace_result. */
+static float error_of(const struct total *t)
+{
+    if (t->samples == 1 || !(t->weight > 0))
+        return 0;
+    return (float)(sqrt(t->pairs) / t->weight);
+}
+
+static void finish(const struct run *run, uint32_t pixel, const struct total *t, bool traced)
+{
+    float rgb[3] = {0}, visible = 0;
+    if (t->weight > 0) {
+        visible = (float)(t->visible / t->weight);
+        for (int c = 0; c < 3; c++)
+            rgb[c] = (float)(t->rgb[c] / t->weight);
+        if (t->count == t->samples) { /* nothing hidden: no noise from the emission either */
+            visible = 1;
+            if (!(run->mode & TRACE_WEIGHTS))
+                memcpy(rgb, run->mean_emission, sizeof rgb);
+        }
+    }
+    store(run, pixel, rgb, visible, error_of(t), traced ? t->samples : 0);
+}
+
+/* Takes all samples, or as many as the asked error needs, for the listed receivers. */
+static void sample_receivers(
+    struct run *run, struct trace_receiver *receivers, uint32_t count, uint32_t extra_mode)
+{
+    struct trace_packet packet;
+    struct total totals[TILE_RECEIVERS] = {0};
+    uint64_t rays = 0;
+    for (uint32_t b = 0; b < run->block_count && count; b++) {
+        for (uint32_t first = 0; first < count; first += TRACE_LANES) {
+            uint32_t lanes = count - first < TRACE_LANES ? count - first : TRACE_LANES;
+            struct trace_sums sums = {0};
+            trace_packet_load(
+                &packet, &run->emitter, receivers + first, lanes, run->job->seed, run->low_bits);
+            trace_packet_run(
+                &run->emitter, &packet, &run->blocks[b], run->mode | extra_mode, &sums);
+            for (uint32_t lane = 0; lane < lanes; lane++)
+                add_sums(run, &totals[first + lane], &sums, (int)lane, run->blocks[b].count);
+            rays += sums.rays;
+        }
+        uint32_t kept = 0;
+        for (uint32_t i = 0; i < count; i++) {
+            if (b + 1 == run->block_count || error_of(&totals[i]) < run->job->target_error) {
+                finish(run, receivers[i].pixel, &totals[i], !(extra_mode & TRACE_ASSUME_VISIBLE));
+                continue;
+            }
+            receivers[kept] = receivers[i];
+            totals[kept++] = totals[i];
+        }
+        count = kept;
+    }
+    atomic_fetch_add(&run->rays, rays);
+}
+
+static bool is_late(struct run *run)
+{
+    uint64_t deadline = run->job->deadline_ns;
+    if (deadline && trace_seconds() * 1e9 > (double)deadline)
+        atomic_store(&run->late, true);
+    return atomic_load(&run->late);
+}
+
+static void sample_tile(void *context, uint32_t item)
+{
+    struct run *run = context;
+    struct trace_receiver receivers[TILE_RECEIVERS];
+    if (is_late(run))
+        return;
+    uint32_t count = gather(run, tile_of(run, item), run->full, receivers);
+    atomic_fetch_add(&run->full_receivers, count);
+    sample_receivers(run, receivers, count, 0);
+}
+
+/* Marks what is no receiver, for good. */
+static void clear_tile(void *context, uint32_t item)
+{
+    struct run *run = context;
+    struct tile t = tile_of(run, item);
+    uint64_t receivers = 0;
+    for (uint32_t y = t.y0; y < t.y1; y++)
+        for (uint32_t x = t.x0; x < t.x1; x++) {
+            struct trace_receiver receiver;
+            uint32_t pixel = y * run->job->width + x;
+            if (read_receiver(run, pixel, &receiver))
+                receivers++;
+            else
+                store(run, pixel, run->mean_emission, 1, 0, 0);
+        }
+    atomic_fetch_add(&run->receivers, receivers);
+}
+
+static void pretest_tile(void *context, uint32_t item)
+{
+    struct run *run = context;
+    struct trace_receiver receivers[TILE_RECEIVERS];
+    struct trace_packet packet;
+    uint64_t rays = 0;
+    if (is_late(run))
+        return;
+    uint32_t count = gather(run, tile_of(run, item), NULL, receivers);
+    for (uint32_t first = 0; first < count; first += TRACE_LANES) {
+        uint32_t lanes = count - first < TRACE_LANES ? count - first : TRACE_LANES;
+        struct trace_sums sums = {0};
+        trace_packet_load(&packet, &run->emitter, receivers + first, lanes, ~run->job->seed,
+            run->pretest_low_bits);
+        trace_packet_run(&run->emitter, &packet, &run->pretest, TRACE_COUNT_ONLY, &sums);
+        trace_packet_run(&run->emitter, &packet, &run->rim, TRACE_UNSHIFTED, &sums);
+        for (uint32_t lane = 0; lane < lanes; lane++)
+            run->verdicts[receivers[first + lane].pixel] =
+                sums.count[lane] == PRETEST_NET + PRETEST_RIM ? LIT
+                : sums.count[lane] == 0                       ? UMBRA
+                                                              : MIXED;
+        rays += sums.rays;
+    }
+    atomic_fetch_add(&run->rays, rays);
+}
+
+/* Settles the receivers that need no more rays. */
+static void settle_tile(void *context, uint32_t item)
+{
+    struct run *run = context;
+    struct tile t = tile_of(run, item);
+    struct trace_receiver lit[TILE_RECEIVERS];
+    uint32_t lit_count = 0;
+    bool exact = !((run->mode & TRACE_WEIGHTS) && (run->mode & TRACE_COLOUR));
+    for (uint32_t y = t.y0; y < t.y1; y++)
+        for (uint32_t x = t.x0; x < t.x1; x++) {
+            static const float zero[3];
+            uint32_t pixel = y * run->job->width + x, verdict = run->verdicts[pixel];
+            if (run->full[pixel])
+                continue;
+            if (verdict == UMBRA)
+                store(run, pixel, zero, 0, 0, 0);
+            else if (verdict == LIT && exact)
+                store(run, pixel, run->mean_emission, 1, 0, 0);
+            else if (verdict == LIT && read_receiver(run, pixel, &lit[lit_count]))
+                lit_count++;
+        }
+    sample_receivers(run, lit, lit_count, TRACE_ASSUME_VISIBLE);
+}
+
+/* Lit beside umbra: a contact, or a silhouette whose penumbra is thinner than a receiver. */
+static bool is_edge(uint8_t a, uint8_t b)
+{
+    return (a == LIT && b == UMBRA) || (a == UMBRA && b == LIT);
+}
+
+/* full = a mixed verdict or an edge within `radius` receivers, in x and then in y. */
+static bool dilate(struct run *run)
+{
+    uint32_t w = run->job->width, h = run->job->height;
+    uint32_t radius = run->job->dilation ? run->job->dilation : DEFAULT_DILATION;
+    uint8_t *rows = calloc((size_t)w * h, 1);
+    if (!rows)
+        return false;
+    for (uint32_t pixel = 0; pixel < w * h; pixel++) {
+        uint8_t own = run->verdicts[pixel], left = pixel % w ? run->verdicts[pixel - 1] : own;
+        uint8_t above = pixel >= w ? run->verdicts[pixel - w] : own;
+        if (own != MIXED && !is_edge(own, left) && !is_edge(own, above))
+            continue;
+        uint32_t x = pixel % w, low = x > radius ? x - radius : 0;
+        uint32_t high = x + radius < w ? x + radius : w - 1;
+        memset(rows + pixel - x + low, 1, high - low + 1);
+    }
+    for (uint32_t y = 0; y < h; y++) {
+        uint32_t low = y > radius ? y - radius : 0, high = y + radius < h ? y + radius : h - 1;
+        for (uint32_t from = low; from <= high; from++)
+            for (uint32_t x = 0; x < w; x++)
+                run->full[(size_t)y * w + x] |= rows[(size_t)from * w + x];
+    }
+    free(rows);
+    return true;
+}
+
+static uint32_t log2_floor(uint32_t x)
+{
+    return 31 - (uint32_t)__builtin_clz(x);
+}
+
+/* All points: the blocks, the pre-test's net, the light's corners (a disk's four quarters). */
+static bool prepare_points(struct run *run, struct pen_error *error)
+{
+    const struct pen_trace_job *job = run->job;
+    uint32_t n = run->samples, total = n + PRETEST_NET + PRETEST_RIM;
+    uint32_t *xs = malloc(2 * (size_t)total * sizeof *xs), *ys = xs + total;
+    run->points = (int32_t *)xs;
+    if (!xs)
+        return pen_fail(error, PEN_INTERNAL, "", "Out of memory.");
+    uint32_t block = job->target_error > 0 && n > FIRST_BLOCK ? FIRST_BLOCK : n;
+    uint32_t salt = trace_hash(job->seed + 1);
+    run->low_bits = 0xffffffffu >> (log2_floor(block) / 2);
+    run->pretest_low_bits = 0xffffffffu >> (log2_floor(PRETEST_NET) / 2);
+    bool ok = true;
+    for (uint32_t first = 0; first < n && ok; first += block) {
+        if (first > block) /* 256, 256, 512, 1024, ... : each a net of its own */
+            block = first;
+        ok = trace_samples_net(first, block, job->seed, xs + first, ys + first);
+        run->blocks[run->block_count++] = (struct trace_block){
+            run->points + first, run->points + total + first, block, salt + first};
+    }
+    ok = ok && trace_samples_net(0, PRETEST_NET, ~job->seed, xs + n, ys + n);
+    if (!ok)
+        return pen_fail(error, PEN_INTERNAL, "", "Out of memory.");
+    for (uint32_t i = 0; i < n + PRETEST_NET; i++) { /* from [0,1) to [-1,1) */
+        xs[i] ^= 0x80000000u;
+        ys[i] ^= 0x80000000u;
+    }
+    bool round = run->emitter.type != PEN_TRACE_RECT;
+    for (uint32_t i = 0; i < PRETEST_RIM; i++) {
+        int32_t far_u = i & 1 ? INT32_MAX : -INT32_MAX, far_v = i & 2 ? INT32_MAX : -INT32_MAX;
+        run->points[n + PRETEST_NET + i] = round && (i == 0 || i == 3) ? 0 : far_u;
+        run->points[total + n + PRETEST_NET + i] = round && (i == 1 || i == 2) ? 0 : far_v;
+    }
+    run->pretest = (struct trace_block){
+        run->points + n, run->points + total + n, PRETEST_NET, salt + MAX_SAMPLES};
+    run->rim = (struct trace_block){run->points + n + PRETEST_NET,
+        run->points + total + n + PRETEST_NET, PRETEST_RIM, salt + MAX_SAMPLES + PRETEST_NET};
+    return true;
+}
+
+static bool check_job(
+    const struct pen_trace_light *light, const struct pen_trace_job *job, struct pen_error *error)
+{
+    if (light->type > PEN_TRACE_POINT)
+        return pen_fail(error, PEN_UNPROCESSABLE, "", "There is no light type %u.", light->type);
+    bool area = light->type != PEN_TRACE_POINT;
+    if ((area && !(light->half[0] > 0)) || (light->type == PEN_TRACE_RECT && !(light->half[1] > 0)))
+        return pen_fail(error, PEN_UNPROCESSABLE, "", "The light has no extent.");
+    if (light->emission && (light->columns == 0 || light->rows == 0 || light->columns > 1u << 16 ||
+                               light->rows > 1u << 16))
+        return pen_fail(error, PEN_UNPROCESSABLE, "", "The light's emission has no texels.");
+    if (job->width == 0 || job->height == 0 ||
+        (uint64_t)job->width * job->height >= (uint64_t)1 << 31)
+        return pen_fail(error, PEN_UNPROCESSABLE, "", "The job has no or too many receivers.");
+    if (job->samples == 0 || job->samples > MAX_SAMPLES)
+        return pen_fail(
+            error, PEN_UNPROCESSABLE, "", "The sample count must be 1 to %u.", MAX_SAMPLES);
+    return true;
+}
+
+/* The adaptive mode's first half: settles what the pre-test settles and leaves the rest in `full`.
+ */
+static bool select_receivers(
+    struct run *run, uint32_t threads, uint32_t tiles, double *cpu_seconds, struct pen_error *error)
+{
+    size_t count = (size_t)run->job->width * run->job->height;
+    run->verdicts = calloc(count, 1);
+    run->full = calloc(count, 1);
+    if (!run->verdicts || !run->full)
+        return pen_fail(error, PEN_INTERNAL, "", "Out of memory.");
+    trace_parallel(threads, tiles, pretest_tile, run, cpu_seconds);
+    if (!dilate(run))
+        return pen_fail(error, PEN_INTERNAL, "", "Out of memory.");
+    trace_parallel(threads, tiles, settle_tile, run, cpu_seconds);
+    return true;
+}
+
+bool pen_trace_visibility(struct pen_trace_scene *scene, const struct pen_trace_light *light,
+    const struct pen_trace_job *job, const struct pen_trace_result *result,
+    struct pen_trace_stats *stats, struct pen_error *error)
+{
+    double start = trace_seconds(), cpu_seconds = 0;
+    struct run run = {.scene = scene, .job = job, .result = result};
+    bool ok = false;
+    if (!check_job(light, job, error))
+        return false;
+    bool point = light->type == PEN_TRACE_POINT;
+    run.samples = point ? 1 : 1u << log2_floor(2 * job->samples - 1);
+    run.position_stride = job->position_stride ? job->position_stride : 3;
+    run.normal_stride = job->normal_stride ? job->normal_stride : 3;
+    run.emitter = trace_emitter_of(light);
+    run.mode = (run.emitter.emission ? TRACE_COLOUR : 0) |
+               (job->weighting == PEN_TRACE_G && !point ? TRACE_WEIGHTS : 0);
+    struct trace_silhouette silhouette = trace_silhouette_of(&run.emitter);
+    uint64_t builds = scene->builds;
+    const struct trace_hierarchy *hierarchy = trace_hierarchy_get(scene, &silhouette, error);
+    if (!hierarchy)
+        return false;
+    double build_seconds = scene->builds != builds ? trace_seconds() - start : 0;
+    start = trace_seconds();
+    run.emitter.scene = hierarchy->scene;
+    if (!trace_emitter_average(&run.emitter, run.mean_emission, error) ||
+        !prepare_points(&run, error))
+        goto fail;
+    run.tile_height = job->height == 1 ? 1 : TILE;
+    run.tile_width = job->height == 1 ? TILE_RECEIVERS : TILE;
+    run.tiles_x = (job->width + run.tile_width - 1) / run.tile_width;
+    uint32_t tiles = run.tiles_x * ((job->height + run.tile_height - 1) / run.tile_height);
+    uint32_t threads = trace_thread_count(job->threads);
+    trace_parallel(threads, tiles, clear_tile, &run, &cpu_seconds);
+    if (job->adaptive && run.samples > PRETEST_NET + PRETEST_RIM &&
+        !select_receivers(&run, threads, tiles, &cpu_seconds, error))
+        goto fail;
+    trace_parallel(threads, tiles, sample_tile, &run, &cpu_seconds);
+    if (atomic_load(&run.late)) {
+        pen_fail(error, PEN_DEADLINE, "", "The deadline passed while rays were traced.");
+        goto fail;
+    }
+    if (stats) {
+        double seconds = trace_seconds() - start;
+        *stats = (struct pen_trace_stats){.rays = run.rays,
+            .receivers = run.receivers,
+            .full_receivers = run.full_receivers,
+            .build_seconds = build_seconds,
+            .casters = hierarchy->triangles,
+            .filtered = hierarchy->filtered,
+            .seconds = seconds,
+            .cpu_seconds = cpu_seconds,
+            .mrays_per_second = (double)run.rays / seconds * 1e-6,
+            .samples = run.samples,
+            .threads = threads};
+    }
+    ok = true;
+fail:
+    free(run.points);
+    free(run.verdicts);
+    free(run.full);
+    return ok;
+}

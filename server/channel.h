@@ -1,0 +1,78 @@
+/* What penumbrad and penumbra-worker say to each other: one SOCK_SEQPACKET packet per message, with
+ * descriptors attached. Both ends come from one build; the version catches a mixed installation. */
+#pragma once
+#include "protocol/result.h"
+#include <stddef.h>
+
+#define CHANNEL_VERSION 1u
+#define CHANNEL_WORKER_FD 3 /* the worker's end */
+#define CHANNEL_MAX_FDS (1 + PEN_MAX_LIGHTS)
+
+/* --warm-up N: when the worker compiles what common requests need. */
+enum worker_warm_up { WORKER_NO_WARM_UP, WORKER_WARM_UP_FIRST, WORKER_WARM_UP_IDLE };
+
+enum channel_kind {
+    CHANNEL_HELLO = 1, /* worker: the context stands */
+    CHANNEL_REFUSED,   /* worker: there is no such device; it then exits */
+    CHANNEL_WARM,      /* worker: warmed up */
+    CHANNEL_STARTED,   /* worker: the GL thread takes this job */
+    CHANNEL_RENDERED,  /* worker: the GL thread is done with it, encoding follows */
+    CHANNEL_DONE, /* worker: the answer; one descriptor, a sealed memfd, when there is an image */
+    CHANNEL_RESIDENT, /* worker: the scenes in GPU memory, when they have changed */
+    CHANNEL_JOB,      /* front end: descriptors: the scene's blob, then `image_count` images */
+    CHANNEL_DROP,     /* front end: the scene was deleted */
+    CHANNEL_KINDS
+};
+
+struct channel_hello {
+    uint32_t pid;
+    float create_ms;
+    struct pen_device_info device;
+};
+struct channel_warm {
+    float warm_ms;
+    uint32_t reserved;
+    uint64_t gpu_bytes;
+};
+struct channel_job {
+    struct pen_request request;
+    uint32_t image_count;
+    uint8_t images[PEN_MAX_LIGHTS][PEN_ID_BYTES]; /* in the order of the descriptors */
+};
+#define CHANNEL_MAX_RESIDENT 128 /* the ones used last, if there are more */
+struct channel_resident {
+    uint32_t count, reserved;
+    uint8_t scenes[CHANNEL_MAX_RESIDENT][PEN_ID_BYTES];
+};
+struct channel_drop {
+    uint8_t scene[PEN_ID_BYTES];
+};
+
+struct channel_message {
+    uint32_t version, kind;
+    uint64_t job;
+    union {
+        struct channel_hello hello;
+        struct channel_warm warm;
+        struct channel_job job_data;
+        struct channel_drop drop;
+        struct channel_resident resident;
+        struct pen_error refused;
+        struct pen_result result;
+    };
+};
+
+struct channel_fds {
+    uint32_t count;
+    int fd[CHANNEL_MAX_FDS];
+};
+
+/* Sends one message; only the bytes that its kind uses travel. `fds` may be NULL; they stay the
+ * caller's. False with errno when the peer is gone or (non-blocking) its buffer is full. */
+bool channel_send(int socket, const struct channel_message *message, const struct channel_fds *fds);
+
+/* Receives one message; the caller owns the descriptors. Returns 1, 0 at the end of the stream, and
+ * -1 with errno: EAGAIN when a non-blocking socket has none, EPROTO for anything that is not a
+ * message of this version (descriptors are then closed). */
+int channel_receive(int socket, struct channel_message *message, struct channel_fds *fds);
+void channel_close_fds(struct channel_fds *fds);

@@ -1,0 +1,89 @@
+/* penumbrad: settings, signals, and the life of the service. */
+#include "renderer/renderer.h"
+#include "server/log.h"
+#include "server/service.h"
+#include <errno.h>
+#include <pthread.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#define EXIT_SETTINGS 2
+#define EXIT_NO_DEVICE 3
+
+static bool hurry; /* atomic: a second signal came */
+
+/* Waits for the second SIGTERM while the first is being honoured. */
+static void *wait_for_second(void *argument)
+{
+    const sigset_t *signals = argument;
+    int which;
+    sigwait(signals, &which);
+    if (which == SIGUSR1)
+        return NULL; /* it is over already */
+    log_event(LOG_INFO, "second signal: what still runs is given up");
+    __atomic_store_n(&hurry, true, __ATOMIC_RELEASE);
+    return NULL;
+}
+
+/* Returns when a signal came (true) or when there is no device to render on (false). */
+static bool run(struct service *service, const sigset_t *signals)
+{
+    const struct timespec tick = {0, 100000000};
+    for (;;) {
+        struct worker_pool_numbers pool;
+        int which = sigtimedwait(signals, NULL, &tick);
+        if (which > 0) {
+            log_event(LOG_INFO, "signal %d: draining", which);
+            return true;
+        }
+        worker_pool_read(service->pool, &pool);
+        if (!pool.has_device && pool.refused.code != PEN_OK) {
+            log_event(LOG_ERROR, "no device to render on: %.*s",
+                (int)sizeof pool.refused.message - 1, pool.refused.message);
+            return false;
+        }
+    }
+}
+
+int main(int argc, char **argv)
+{
+    static struct config config;
+    struct pen_error error = {0};
+    if (config_answer_help(argc, argv))
+        return 0;
+    if (!config_read(&config, argc, argv, &error)) {
+        fprintf(stderr, "penumbrad: %s\n", error.message);
+        return EXIT_SETTINGS;
+    }
+    log_init(config.log_format.index);
+    static sigset_t signals;
+    sigemptyset(&signals);
+    sigaddset(&signals, SIGTERM);
+    sigaddset(&signals, SIGINT);
+    sigaddset(&signals, SIGUSR1);
+    pthread_sigmask(SIG_BLOCK, &signals, NULL); /* before any thread, so that all inherit it */
+    sigdelset(&signals, SIGUSR1);
+    signal(SIGPIPE, SIG_IGN);
+    struct service *service = service_create(&config, pen_renderer_catalogue(), &error);
+    if (!service) {
+        fprintf(stderr, "penumbrad: %s\n", error.message);
+        return EXIT_SETTINGS;
+    }
+    printf("penumbrad %s listens on %s://%s (admin: http://%s)\n", PENUMBRA_VERSION,
+        *config.tls_cert ? "https" : "http", door_address(http_listener_door(service->listener)),
+        door_address(http_listener_door(service->admin)));
+    fflush(stdout);
+    bool asked = run(service, &signals);
+    pthread_t second;
+    sigaddset(&signals, SIGUSR1);
+    if (pthread_create(&second, NULL, wait_for_second, &signals))
+        abort();
+    service_destroy(service, &hurry);
+    pthread_kill(second, SIGUSR1); /* if it still waits */
+    pthread_join(second, NULL);
+    log_event(LOG_INFO, "stopped");
+    return asked ? 0 : EXIT_NO_DEVICE;
+}

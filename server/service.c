@@ -1,0 +1,394 @@
+#include "server/service.h"
+#include "protocol/json_result.h"
+#include "protocol/openapi.h"
+#include "renderer/blob/builder.h"
+#include "server/clock.h"
+#include "server/hash.h"
+#include "server/log.h"
+#include "server/process.h"
+#include "server/routes.h"
+#include <errno.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#define STRAGGLER_MS 200 /* requests on their way when the last answer is out */
+#define CANCEL_MS 10000
+
+bool service_is_draining(const struct service *s)
+{
+    return __atomic_load_n(&s->draining, __ATOMIC_ACQUIRE);
+}
+
+bool service_device(struct service *s, struct pen_device_info *device)
+{
+    struct worker_pool_numbers numbers;
+    worker_pool_read(s->pool, &numbers);
+    *device = numbers.device;
+    return numbers.has_device;
+}
+
+const char *service_obstacle(struct service *s)
+{
+    struct worker_pool_numbers pool;
+    struct scheduler_numbers queue;
+    worker_pool_read(s->pool, &pool);
+    scheduler_read(s->scheduler, &queue);
+    if (service_is_draining(s))
+        return "The service is shutting down.";
+    if (!pool.warmed)
+        return "The worker is still warming up.";
+    if (!pool.up)
+        return "No worker is up.";
+    if (queue.full)
+        return "The queue is full.";
+    return NULL;
+}
+
+/* ---- what the pool asks for ---- */
+
+static bool open_job(
+    void *context, struct channel_job *job, struct channel_fds *fds, struct pen_error *error)
+{
+    struct service *s = context;
+    bool canary = !memcmp(job->request.scene, s->canary_id, PEN_ID_BYTES);
+    int fd = canary ? fcntl(s->canary_blob, F_DUPFD_CLOEXEC, 3)
+                    : scene_store_open_blob(s->store, STORE_SCENES, job->request.scene, error);
+    if (fd < 0)
+        return pen_fail(error, PEN_UNAVAILABLE, "", "The service is out of descriptors.");
+    fds->fd[fds->count++] = fd;
+    for (uint32_t i = 0; i < job->request.light_count; i++) {
+        const struct pen_light *light = &job->request.lights[i];
+        bool known = light->texture != PEN_TEXTURE_IMAGE;
+        for (uint32_t k = 0; k < job->image_count; k++)
+            known = known || !memcmp(job->images[k], light->image, PEN_ID_BYTES);
+        if (known)
+            continue;
+        fd = scene_store_open_blob(s->store, STORE_IMAGES, light->image, error);
+        if (fd < 0)
+            return false;
+        memcpy(job->images[job->image_count++], light->image, PEN_ID_BYTES);
+        fds->fd[fds->count++] = fd;
+    }
+    return true;
+}
+
+static void on_picture(void *context, struct picture *picture)
+{
+    struct service *s = context;
+    if (!memcmp(picture->result.completed.scene, s->canary_id, PEN_ID_BYTES))
+        return;
+    metrics_render(s->metrics, &picture->result);
+    result_cache_put(s->cache, picture);
+}
+
+static void on_work(void *context)
+{
+    struct service *s = context;
+    if (s->pool)
+        worker_pool_wake(s->pool);
+}
+
+/* ---- start ---- */
+
+/* A square receiver: the smallest scene that goes through every pass. */
+static bool make_canary(struct service *s, struct pen_error *error)
+{
+    static const float corners[4][3] = {{-1, 0, -1}, {-1, 0, 1}, {1, 0, 1}, {1, 0, -1}};
+    static const uint32_t indices[6] = {0, 1, 2, 0, 2, 3};
+    static const float world[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
+    struct psc_builder *builder = psc_builder_create();
+    struct psc_material material = psc_material_default();
+    struct psc_mesh mesh = {
+        .positions = corners, .vertex_count = 4, .indices = indices, .index_count = 6};
+    uint32_t primitive;
+    void *data = NULL;
+    size_t bytes;
+    memset(s->canary_id, 0xca, PEN_ID_BYTES); /* no hash of anything */
+    mesh.material = psc_builder_add_material(builder, &material);
+    bool ok = psc_builder_add_mesh(builder, &mesh, &primitive, error);
+    if (ok)
+        psc_builder_add_instance(builder, primitive, world);
+    ok = ok && psc_builder_finish(builder, s->canary_id, &data, &bytes, error);
+    psc_builder_destroy(builder);
+    s->canary_blob = memfd_create("penumbra-canary", MFD_CLOEXEC);
+    if (ok && (s->canary_blob < 0 || write(s->canary_blob, data, bytes) != (ssize_t)bytes))
+        ok = pen_fail(error, PEN_UNAVAILABLE, "", "The service is out of memory.");
+    free(data);
+    return ok;
+}
+
+/* The program that makes the pixels, hashed: part of every tag. */
+static bool name_build(const char *worker_path, struct pen_error *error)
+{
+    char piece[1 << 16], text[PEN_ID_HEX + 1];
+    uint8_t digest[PEN_ID_BYTES];
+    struct hash *hash = hash_create();
+    FILE *file = fopen(worker_path, "re");
+    size_t n;
+    while (file && (n = fread(piece, 1, sizeof piece, file)))
+        hash_add(hash, piece, n);
+    hash_finish(hash, digest);
+    pen_id_to_hex(digest, text);
+    picture_set_build(text);
+    if (!file)
+        return pen_fail(error, PEN_UNAVAILABLE, "", "%.200s cannot be read.", worker_path);
+    fclose(file);
+    return true;
+}
+
+static char *read_file(const char *path, struct pen_error *error)
+{
+    char *text = calloc(1, 1 << 18);
+    FILE *file = fopen(path, "re");
+    if (!text)
+        abort();
+    if (!file || !fread(text, 1, (1 << 18) - 1, file)) {
+        pen_fail(error, PEN_UNAVAILABLE, "", "%.200s cannot be read.", path);
+        free(text);
+        text = NULL;
+    }
+    if (file)
+        fclose(file);
+    return text;
+}
+
+static bool is_loopback(const char *listen_on)
+{
+    return !strncmp(listen_on, "127.", 4) || !strncmp(listen_on, "[::1]", 5) ||
+           !strncmp(listen_on, "localhost:", 10);
+}
+
+static bool find_program(
+    const char *set, const char *name, char *path, size_t bytes, struct pen_error *error)
+{
+    if (*set)
+        snprintf(path, bytes, "%s", set);
+    else if (!process_find_sibling(name, path, bytes))
+        return pen_fail(error, PEN_INTERNAL, "", "%s is not installed.", name);
+    if (access(path, X_OK))
+        return pen_fail(error, PEN_UNAVAILABLE, "", "%.200s cannot be run.", path);
+    return true;
+}
+
+static void finish_refresh(struct import_task *task)
+{
+    char id[PEN_ID_HEX + 1];
+    pen_id_to_hex(task->id, id);
+    if (task->error.code)
+        log_event(LOG_ERROR, "importing %s again failed: %s", id, task->error.message);
+    free(task);
+}
+
+/* Blobs of an older version, or damaged ones, are made again from their sources. */
+static void refresh_stale(struct service *s)
+{
+    for (int kind = 0; kind < STORE_KINDS; kind++) {
+        struct store_entry entry;
+        uint8_t after[PEN_ID_BYTES];
+        for (bool first = true; scene_store_list(s->store, kind, first ? NULL : after, &entry, 1);
+             first = false) {
+            memcpy(after, entry.id, PEN_ID_BYTES);
+            if (!entry.stale)
+                continue;
+            struct import_task *task = calloc(1, sizeof *task);
+            struct pen_error error = {0};
+            if (!task)
+                abort();
+            task->kind = kind;
+            task->finish = finish_refresh;
+            memcpy(task->id, entry.id, PEN_ID_BYTES);
+            if (!importer_submit(s->importer, task, &error))
+                free(task);
+        }
+    }
+}
+
+static bool start_importer(struct service *s, struct pen_error *error)
+{
+    const struct config *c = s->config;
+    struct importer_config config = {.store = s->store,
+        .processes = (uint32_t)c->imports,
+        .queue_limit = (uint32_t)c->uploads,
+        .timeout_ms = c->import_timeout_ms,
+        .memory_bytes = c->import_memory.bytes,
+        .cpu_seconds = c->import_cpu_seconds};
+    if (!find_program(c->import_path, "penumbra-import", config.import_path,
+            sizeof config.import_path, error))
+        return false;
+    s->importer = importer_create(&config);
+    refresh_stale(s);
+    return true;
+}
+
+static bool start_pool(struct service *s, struct pen_error *error)
+{
+    const struct config *c = s->config;
+    struct worker_pool_config config = {.workers = (uint32_t)c->workers,
+        .warm_up = c->warm_up.on,
+        .hang_timeout_ms = c->hang_timeout_ms,
+        .quarantine_s = c->quarantine_s,
+        .scheduler = s->scheduler,
+        .open_job = open_job,
+        .on_picture = on_picture,
+        .context = s,
+        .renderer = {.device = c->device.index,
+            .device_index = (uint32_t)c->device_index,
+            .require_gpu = c->require_gpu.on,
+            .debug = c->gl_debug.on,
+            .gpu_memory_bytes = c->gpu_memory.bytes}};
+    if (!find_program(c->worker_path, "penumbra-worker", config.worker_path,
+            sizeof config.worker_path, error) ||
+        !name_build(config.worker_path, error))
+        return false;
+    s->pool = worker_pool_create(&config);
+    return true;
+}
+
+static bool start_listeners(struct service *s, struct pen_error *error)
+{
+    const struct config *c = s->config;
+    struct http_config public = {.callbacks = &routes_callbacks,
+        .context = s,
+        .threads = (uint32_t)c->http_threads,
+        .cert_pem = s->cert_pem,
+        .key_pem = s->key_pem,
+        .door = {.listen = c->listen,
+            .connections = (uint32_t)c->connections,
+            .connections_per_address = (uint32_t)c->connections_per_address,
+            .header_timeout_ms = c->header_timeout_ms,
+            .keep_alive_ms = c->keep_alive_ms,
+            .body_rate = c->body_rate.bytes}};
+    struct http_config admin = {.callbacks = &routes_admin_callbacks,
+        .context = s,
+        .threads = 1,
+        .door = {.listen = c->admin_listen,
+            .connections = 64,
+            .connections_per_address = 64,
+            .header_timeout_ms = 5000,
+            .keep_alive_ms = 60000,
+            .body_rate = 1024}};
+    s->listener = http_listener_create(&public, error);
+    s->admin = s->listener ? http_listener_create(&admin, error) : NULL; /* it reports on both */
+    return s->admin != NULL;
+}
+
+struct service *service_create(
+    const struct config *config, const struct pen_catalogue *catalogue, struct pen_error *error)
+{
+    struct service *s = calloc(1, sizeof *s);
+    if (!s)
+        abort();
+    s->config = config;
+    s->catalogue = catalogue;
+    s->started_ns = clock_now_ns();
+    s->canary_blob = -1;
+    pthread_mutex_init(&s->canary_lock, NULL);
+    struct rlimit files;
+    if (!getrlimit(RLIMIT_NOFILE, &files)) {
+        files.rlim_cur = files.rlim_max;
+        setrlimit(RLIMIT_NOFILE, &files);
+    }
+    if (!is_loopback(config->listen) && !*config->token_file && !config->insecure.on) {
+        pen_fail(error, PEN_UNPROCESSABLE, "",
+            "Beyond loopback --token-file is needed, or --insecure if that is meant.");
+        goto fail;
+    }
+    if ((*config->token_file && !(s->auth = auth_load(config->token_file, error))) ||
+        (*config->tls_cert && (!(s->cert_pem = read_file(config->tls_cert, error)) ||
+                                  !(s->key_pem = read_file(config->tls_key, error)))))
+        goto fail;
+    s->openapi = pen_openapi_json(catalogue, PENUMBRA_VERSION);
+    struct hash *hash = hash_create();
+    uint8_t digest[PEN_ID_BYTES];
+    hash_add(hash, s->openapi, strlen(s->openapi));
+    hash_finish(hash, digest);
+    pen_id_to_hex(digest, s->openapi_tag);
+    if (!make_canary(s, error) || !(s->store = scene_store_open(config->store, error)))
+        goto fail;
+    struct scheduler_limits limits = {
+        (uint32_t)config->queue_limit, (uint32_t)config->client_share, (uint32_t)config->workers};
+    s->metrics = metrics_create(catalogue);
+    s->cache = result_cache_create(config->result_cache.bytes);
+    s->scheduler = scheduler_create(&limits, on_work, s);
+    if (!start_importer(s, error) || !start_pool(s, error) || !start_listeners(s, error))
+        goto fail;
+    return s;
+fail:
+    service_destroy(s, &(bool){true});
+    return NULL;
+}
+
+/* ---- stop ---- */
+
+static uint32_t active(const struct service *s)
+{
+    return (s->listener ? http_listener_active(s->listener) : 0);
+}
+
+static void drain(struct service *s, const bool *hurry)
+{
+    __atomic_store_n(&s->draining, true, __ATOMIC_RELEASE);
+    if (s->listener)
+        http_listener_drain(s->listener);
+    uint64_t end = clock_now_ns() + s->config->drain_timeout_ms * CLOCK_MS, quiet = 0;
+    while (clock_now_ns() < end && !__atomic_load_n(hurry, __ATOMIC_ACQUIRE)) {
+        uint64_t now = clock_now_ns();
+        if (active(s))
+            quiet = 0;
+        else if (!quiet)
+            quiet = now;
+        else if (now - quiet > STRAGGLER_MS * CLOCK_MS)
+            break;
+        usleep(5000);
+    }
+    if (s->scheduler)
+        scheduler_drain(s->scheduler);
+    if (s->importer)
+        importer_cancel(s->importer);
+    /* What is left is answered with 503; a resumed connection may only then be stopped. */
+    end = clock_now_ns() + CANCEL_MS * CLOCK_MS;
+    do {
+        if (s->scheduler)
+            scheduler_cancel(s->scheduler);
+        usleep(2000);
+    } while ((active(s) || (s->admin && http_listener_active(s->admin))) && clock_now_ns() < end);
+}
+
+void service_destroy(struct service *s, const bool *hurry)
+{
+    drain(s, hurry);
+    if (s->importer)
+        importer_destroy(s->importer);
+    if (s->admin)
+        http_listener_drain(s->admin);
+    if (s->scheduler)
+        scheduler_cancel(s->scheduler);
+    if (s->listener)
+        http_listener_destroy(s->listener);
+    if (s->admin)
+        http_listener_destroy(s->admin);
+    struct worker_pool *pool = s->pool;
+    if (pool)
+        worker_pool_destroy(pool);
+    if (s->scheduler)
+        scheduler_destroy(s->scheduler);
+    if (s->cache)
+        result_cache_destroy(s->cache);
+    if (s->metrics)
+        metrics_destroy(s->metrics);
+    if (s->store)
+        scene_store_close(s->store);
+    if (s->canary_blob >= 0)
+        close(s->canary_blob);
+    auth_destroy(s->auth);
+    free(s->openapi);
+    free(s->cert_pem);
+    free(s->key_pem);
+    pthread_mutex_destroy(&s->canary_lock);
+    free(s);
+}

@@ -1,0 +1,54 @@
+/* The parts of the running daemon, and what ties them together. */
+#pragma once
+#include "protocol/technique_info.h"
+#include "server/auth.h"
+#include "server/config.h"
+#include "server/http.h"
+#include "server/importer.h"
+#include "server/metrics.h"
+#include "server/result_cache.h"
+#include "server/scene_store.h"
+#include "server/scheduler.h"
+#include "server/worker_pool.h"
+#include <pthread.h>
+
+struct service {
+    /* Constant after service_create. */
+    const struct config *config;
+    const struct pen_catalogue *catalogue;
+    struct scene_store *store;
+    struct importer *importer;
+    struct scheduler *scheduler;
+    struct worker_pool *pool;
+    struct result_cache *cache;
+    struct metrics *metrics;
+    struct auth *auth; /* NULL: no token is asked for */
+    struct http_listener *listener, *admin;
+    char *openapi, openapi_tag[PEN_ID_HEX + 1];
+    char *cert_pem, *key_pem;
+    uint64_t started_ns;
+    int canary_blob; /* a plane, as a blob in a memfd */
+    uint8_t canary_id[PEN_ID_BYTES];
+
+    bool draining;                       /* atomic */
+    uint32_t uploads;                    /* atomic: under way */
+    uint64_t bytes_received, bytes_sent; /* atomic, public listener */
+
+    pthread_mutex_t canary_lock; /* guards the two below */
+    uint64_t canary_ns;          /* when the canary was last rendered; 0: never */
+    bool canary_failed;
+};
+
+/* Opens the store, starts the workers and the listeners. Errors: what the parts say. */
+struct service *service_create(
+    const struct config *config, const struct pen_catalogue *catalogue, struct pen_error *error);
+/* Answers every accepted request, within the drain timeout or until `hurry` (atomic) is set, and
+ * stops everything. */
+void service_destroy(struct service *service, const bool *hurry);
+
+bool service_is_draining(const struct service *service);
+/* Why it is not ready (a constant sentence), or NULL: it is, as far as can be told without a test
+ * render. */
+const char *service_obstacle(struct service *service);
+/* The device, once a worker has told. */
+bool service_device(struct service *service, struct pen_device_info *device);

@@ -1,0 +1,68 @@
+/* The classifier may only skip work, never change a pixel: every method, with and without. */
+#include "tests/accuracy/harness.h"
+#include "tests/unit/check.h"
+
+static void compare(const uint8_t *id, const char *method, const char *view)
+{
+    char settings[768];
+    struct shot on, off;
+    snprintf(settings, sizeof settings, "technique=%s&classify=on&%s", method, view);
+    harness_shot(id, settings, &on);
+    snprintf(settings, sizeof settings, "technique=%s&classify=off&%s", method, view);
+    harness_shot(id, settings, &off);
+    float worst = 0;
+    for (uint32_t i = 0; i < 4 * on.width * on.height; i++)
+        worst = fmaxf(worst, fabsf(on.visibility[i] - off.visibility[i]));
+    const uint32_t *c = on.result.class_pixels;
+    fprintf(stderr, "%-14s worst %.5f; lit %u, undecided %u, umbra %u\n", method, (double)worst,
+        c[0], c[1], c[2]);
+    CHECK(worst < 1.0f / 255);
+    CHECK(off.result.class_pixels[0] == 0 && on.result.full_work_pixels == c[1]);
+    harness_shot_finish(&on);
+    harness_shot_finish(&off);
+}
+
+/* T1 has a known share of each class: the classifier must find most of what is decided. */
+static void check_shares(const uint8_t *half_plane)
+{
+    struct shot shot;
+    harness_shot(half_plane,
+        "technique=pcss&classify=on&" HARNESS_VIEW
+        "&light.type=rect&light.position=0,3,0&light.target=0,0,0&light.up=0,0,-1"
+        "&light.width=0.5&light.height=0.5",
+        &shot);
+    struct planar_case t = {.c = 1.2, .h = 3, .a = 0.25};
+    uint32_t truth[3] = {0};
+    for (uint32_t i = 0; i < shot.width * shot.height; i++) {
+        double v = truth_half_plane(shot.position[4 * i], 0, &t);
+        truth[v >= 1 ? 0 : v <= 0 ? 2 : 1]++;
+    }
+    CHECK(shot.result.class_pixels[0] <= truth[0] && shot.result.class_pixels[0] > truth[0] / 2);
+    CHECK(shot.result.class_pixels[2] <= truth[2] && shot.result.class_pixels[2] > truth[2] / 3);
+    harness_shot_finish(&shot);
+}
+
+int main(int argc, char **argv)
+{
+    const struct pen_catalogue *catalogue = pen_renderer_catalogue();
+    uint8_t demo[PEN_ID_BYTES], half[PEN_ID_BYTES];
+    harness_scene(&(struct pen_generated_options){.kind = PEN_GENERATED_DEMO}, demo);
+    harness_scene(
+        &(struct pen_generated_options){.kind = PEN_GENERATED_HALF_PLANE, .caster_height = 1.2f},
+        half);
+    for (uint32_t i = 0; i < catalogue->count; i++) {
+        const char *name = catalogue->items[i]->name;
+        if ((argc > 1 && strcmp(argv[1], name)) ||
+            catalogue->items[i]->cost_class == PEN_COST_REFERENCE)
+            continue;
+        compare(demo, name, "width=320&height=240&camera.index=0");
+        compare(demo, name,
+            "width=320&height=240&light.type=sun&light.angular_diameter_deg=4&light.position=1,2,"
+            "1");
+        compare(demo, name, "width=320&height=240&light.type=sphere&light.position=1,3,1");
+        compare(half, name, HARNESS_VIEW HARNESS_RECT);
+        compare(half, name, HARNESS_VIEW HARNESS_DISK);
+    }
+    check_shares(half);
+    CHECK_DONE();
+}

@@ -1,0 +1,202 @@
+"""Uploads in every form, and files that mean harm."""
+import io
+import json
+import os
+import socket
+import struct
+import time
+import unittest
+import zipfile
+import zlib
+
+import harness
+from harness import SMALL, SLOW, Daemon, grid_scene, raw, wait
+
+try:
+    import hostile_files
+except ImportError:
+    hostile_files = None
+
+
+def multipart(files, boundary="8a3b"):
+    """files: (file name or None for a plain field, bytes)."""
+    out = b""
+    for name, data in files:
+        out += b"--" + boundary.encode() + b"\r\n"
+        if name is None:
+            out += b'Content-Disposition: form-data; name="comment"\r\n\r\n'
+        else:
+            out += (b'Content-Disposition: form-data; name="files"; filename="%s"\r\n'
+                    b"Content-Type: application/octet-stream\r\n\r\n" % name.encode())
+        out += data + b"\r\n"
+    return out + b"--" + boundary.encode() + b"--\r\n", "multipart/form-data; boundary=" + boundary
+
+
+def gltf_with_buffer(name="mesh.bin"):
+    binary = struct.pack("<9f", 0, 0.5, 0, 0, 0.5, 1, 1, 0.5, 0)
+    document = {"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}],
+                "nodes": [{"mesh": 0}],
+                "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+                "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3",
+                               "min": [0, 0.5, 0], "max": [1, 0.5, 1]}],
+                "bufferViews": [{"buffer": 0, "byteLength": 36}],
+                "buffers": [{"byteLength": 36, "uri": name}]}
+    return json.dumps(document).encode(), binary
+
+
+def png(width, height):
+    rows = b"".join(b"\0" + bytes(v for x in range(width) for v in (x % 256, y % 256, 90))
+                    for y in range(height))
+    chunk = lambda kind, data: (struct.pack(">I", len(data)) + kind + data +
+                                struct.pack(">I", zlib.crc32(kind + data)))
+    return (b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)) +
+            chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b""))
+
+
+class Uploads(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.d = Daemon("--import-memory=512M", "--import-cpu-seconds=10", "--upload-limit=40M")
+
+    @classmethod
+    def tearDownClass(cls):
+        assert cls.d.leftovers() == [], cls.d.leftovers()
+        assert cls.d.stop() == 0
+        cls.d.kill()
+
+    def post(self, body, kind, path="/v1/scenes"):
+        return self.d.call("POST", path, body, {"Content-Type": kind})
+
+    def test_multipart(self):
+        gltf, binary = gltf_with_buffer()
+        one = self.post(*multipart([("scene.gltf", gltf), ("mesh.bin", binary)]))
+        self.assertEqual(one.status, 201, one.body)
+        self.assertEqual(one.json()["triangles"], 1)
+        # The order does not matter, nor what is not a file, nor the boundary.
+        two = self.post(*multipart([(None, b"hello"), ("./mesh.bin", binary), ("scene.gltf", gltf)],
+                                   "x" * 70))
+        self.assertEqual((two.status, two.json()["id"]), (200, one.json()["id"]))
+        self.assertEqual(self.d.render(one.json()["id"], SMALL).status, 200)
+
+    def test_multipart_boundaries_in_pieces(self):
+        """Every way to cut a body in two, and byte by byte."""
+        gltf, binary = gltf_with_buffer("m.bin")
+        body, kind = multipart([("s.gltf", gltf), ("m.bin", binary + b"\r\n--8a3\r\n-\r\n")], "8a3b")
+        gltf_id = None
+        head = ("POST /v1/scenes HTTP/1.1\r\nHost: x\r\nConnection: close\r\nContent-Type: %s\r\n"
+                "Content-Length: %d\r\n\r\n" % (kind, len(body))).encode()
+        for cut in list(range(1, len(body), 41)) + ["bytes"]:
+            with socket.create_connection(("127.0.0.1", self.d.port), timeout=20 * SLOW) as s:
+                s.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+                s.sendall(head)
+                if cut == "bytes":
+                    for i in range(len(body)):
+                        s.sendall(body[i:i + 1])
+                else:
+                    s.sendall(body[:cut])
+                    time.sleep(0.003)
+                    s.sendall(body[cut:])
+                answer = b""
+                while True:
+                    piece = s.recv(65536)
+                    if not piece:
+                        break
+                    answer += piece
+            self.assertIn(int(answer.split()[1]), (200, 201), answer)
+            scene = json.loads(answer.split(b"\r\n\r\n", 1)[1])["id"]
+            gltf_id = gltf_id or scene
+            self.assertEqual(scene, gltf_id)
+
+    def test_single_file_form(self):
+        glb = grid_scene(2, "form")
+        scene = self.post(glb, "model/gltf-binary").json()["id"]
+        form = self.post(*multipart([("any name.glb", glb)]))
+        self.assertEqual((form.status, form.json()["id"]), (200, scene))
+
+    def test_zip(self):
+        gltf, binary = gltf_with_buffer()
+        packed = io.BytesIO()
+        with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as z:
+            z.writestr("folder/scene.gltf", gltf)
+            z.writestr("folder/mesh.bin", binary)
+        answer = self.post(packed.getvalue(), "application/zip")
+        self.assertEqual(answer.status, 201, answer.body)
+        self.assertEqual(answer.json()["triangles"], 1)
+
+    def test_bad_forms(self):
+        gltf, binary = gltf_with_buffer()
+        whole, kind = multipart([("scene.gltf", gltf), ("mesh.bin", binary)])
+        for body, status in ((whole[:-10], 400), (whole.replace(b"form-data", b"attachment"), 400),
+                             (multipart([(None, b"x")])[0], 400),
+                             (multipart([("scene.gltf", gltf)])[0], 422),
+                             (multipart([("a.bin", b"1"), ("a.bin", b"2")])[0], 422),
+                             (b"--8a3b--\r\n", 400), (b"\r\n" * 50000, 400)):
+            answer = self.post(body, kind)
+            self.assertEqual(answer.status, status, (body[:80], answer.body))
+        for name in ("../x.bin", "/etc/x", "a/../b", "a//b", "a\\\\b", "x" * 300, "a/./b"):
+            answer = self.post(*multipart([("scene.gltf", gltf), (name, b"1")]))
+            self.assertIn(answer.status, (400, 422), name)
+        for count, status in ((4200, 413), (9000, 400)):
+            files = [(None if status == 400 else "f%d" % i, b"") for i in range(count)]
+            self.assertEqual(self.post(*multipart(files)).status, status)
+
+    def test_images(self):
+        data = png(20, 10)
+        first = self.post(data, "image/png", "/v1/images")
+        self.assertEqual(first.status, 201, first.body)
+        image = first.json()
+        self.assertEqual((image["width"], image["height"]), (20, 10))
+        self.assertEqual(self.post(data, "image/png", "/v1/images").status, 200)
+        self.assertEqual(self.d.get("/v1/images/" + image["id"]).json(), image)
+        self.assertIn(image["id"], [i["id"] for i in self.d.get("/v1/images").json()["images"]])
+        scene = self.d.upload(grid_scene(2))
+        lit = lambda texture: self.d.render(scene, dict(
+            SMALL, technique={"name": "multisample", "params": {"samples": 16}},
+            lights=[{"type": "rect", "position": [0.4, 3, 0.3], "width": 1, "height": 1,
+                     "texture": texture}]))
+        with_image = lit({"image": image["id"]})
+        self.assertEqual(with_image.status, 200, with_image.body)
+        self.assertEqual(self.d.call("DELETE", "/v1/images/" + image["id"]).status, 204)
+        self.assertEqual(lit({"image": image["id"]}).status, 422)
+        self.assertIn(self.post(b"\x89PNG\r\n\x1a\nxx", "image/png", "/v1/images").status, (400, 422))
+        self.assertEqual(self.post(data, "image/gif", "/v1/images").status, 415)
+        self.assertIn(self.post(data, "image/png").status, (415,))
+
+    def test_too_large_by_chunks(self):
+        """Without a declared length the limit is met in the middle of the body."""
+        piece = b"100000\r\n" + b"x" * 0x100000 + b"\r\n"
+        got, closed = raw(self.d.port, b"POST /v1/scenes HTTP/1.1\r\nHost: x\r\nContent-Type: "
+                          b"model/gltf-binary\r\nTransfer-Encoding: chunked\r\n\r\n" + piece * 44, timeout=5)
+        self.assertIn(b" 413 ", got[:20])
+        self.assertTrue(closed)
+        wait(lambda: self.d.leftovers() == [])
+
+    @unittest.skipIf(hostile_files is None, "no hostile files here")
+    def test_hostile_files(self):
+        scene = self.d.upload(grid_scene(2))
+        total = self.d.get("/v1/scenes").json()["total"]
+        slowest = 0
+        kinds = {".png": "image/png", ".jpg": "image/jpeg", ".webp": "image/webp"}
+        for name, data in hostile_files.files():
+            ending = os.path.splitext(name)[1]
+            image = ending in kinds
+            start = time.monotonic()
+            answer = self.post(data, kinds.get(ending, "application/octet-stream"),
+                               "/v1/images" if image else "/v1/scenes")
+            slowest = max(slowest, time.monotonic() - start)
+            with self.subTest(name=name):
+                self.assertIn(answer.status, (400, 413, 415, 422), answer.body)
+                document = answer.json()
+                self.assertTrue(document["detail"])
+                self.assertNotIn("root:", answer.body.decode())
+                self.assertNotIn(self.d.store, answer.body.decode())
+        self.assertEqual(self.d.leftovers(), [])
+        self.assertEqual(self.d.get("/v1/scenes").json()["total"], total)
+        self.assertEqual(self.d.get("/v1/images").json()["total"], 0)
+        self.assertEqual(self.d.render(scene, SMALL).status, 200)
+        self.assertLess(slowest, 12 * SLOW)
+        print("\n  slowest refusal %.2f s" % slowest)
+
+
+if __name__ == "__main__":
+    harness.main()

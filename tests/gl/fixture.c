@@ -1,0 +1,69 @@
+#include "tests/gl/fixture.h"
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+struct pen_renderer *fixture_renderer(uint32_t device, uint64_t gpu_memory, struct pen_error *error)
+{
+    struct pen_renderer_config config = {
+        .device = device, .gpu_memory_bytes = gpu_memory, .debug = true};
+    memset(error, 0, sizeof *error);
+    return pen_renderer_create(&config, error);
+}
+
+static void die(const struct pen_error *error)
+{
+    fprintf(stderr, "%u %s %s\n", error->code, error->pointer, error->message);
+    exit(1);
+}
+
+void fixture_scene(struct pen_renderer *renderer, uint32_t kind, uint32_t triangles, uint32_t seed,
+    uint8_t id[PEN_ID_BYTES])
+{
+    struct pen_error error = {0};
+    struct pen_generated_options options = {.kind = kind, .triangles = triangles, .seed = seed};
+    void *data;
+    size_t bytes;
+    memset(id, 0, PEN_ID_BYTES);
+    memcpy(id, &options, 12);
+    if (!pen_generate_blob(&options, &data, &bytes, &error))
+        die(&error);
+    int fd = memfd_create("scene", MFD_CLOEXEC);
+    if (fd < 0 || write(fd, data, bytes) != (ssize_t)bytes)
+        exit(1);
+    free(data);
+    if (!pen_renderer_load_scene(renderer, id, fd, &error))
+        die(&error);
+    close(fd);
+}
+
+void fixture_request(
+    struct pen_request *request, const uint8_t id[PEN_ID_BYTES], const char *technique)
+{
+    const struct pen_catalogue *catalogue = pen_renderer_catalogue();
+    const struct pen_technique_info *info = pen_catalogue_find(catalogue, technique);
+    pen_request_default(request, catalogue);
+    memcpy(request->scene, id, PEN_ID_BYTES);
+    memset(request->technique, 0, sizeof request->technique);
+    snprintf(request->technique, sizeof request->technique, "%s", technique);
+    memset(request->technique_params, 0, sizeof request->technique_params);
+    pen_params_default(info->params, request->technique_params);
+    request->width = 200, request->height = 150;
+}
+
+uint64_t fixture_render(
+    struct pen_renderer *renderer, const struct pen_request *request, struct pen_result *result)
+{
+    struct pen_error error = {0};
+    struct pen_frame frame;
+    if (!pen_renderer_render(renderer, request, &frame, result, &error))
+        die(&error);
+    uint64_t hash = 0xcbf29ce484222325u;
+    const uint8_t *bytes = frame.planes[0].data;
+    for (size_t i = 0; i < (size_t)frame.width * frame.height * 4; i++)
+        hash = (hash ^ bytes[i]) * 0x100000001b3u;
+    pen_frame_finish(&frame);
+    return hash;
+}

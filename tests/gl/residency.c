@@ -1,0 +1,95 @@
+/* What stays in GPU memory between requests, what leaves it, and that neither changes a pixel. */
+#include "tests/gl/fixture.h"
+#include "tests/unit/check.h"
+
+static void check_repeats(struct pen_renderer *r, const uint8_t *id)
+{
+    struct pen_request request;
+    struct pen_result result;
+    fixture_request(&request, id, "pcss");
+    uint64_t first = fixture_render(r, &request, &result);
+    CHECK(!result.shadow_inputs_reused);
+    for (int i = 0; i < 100; i++) {
+        CHECK(fixture_render(r, &request, &result) == first);
+        CHECK(result.shadow_inputs_reused);
+    }
+    /* Only the camera moves: nothing of the light's is rebuilt, and no time is spent on it. */
+    request.camera.mode = PEN_CAMERA_ORBIT;
+    request.camera.azimuth_deg += 20;
+    CHECK(fixture_render(r, &request, &result) != first);
+    CHECK(result.shadow_inputs_reused);
+    CHECK(result.stage_ms[PEN_STAGE_SHADOW] == 0);
+    /* The light moves: its inputs are new, and the picture changes. */
+    struct pen_request other = result.completed;
+    uint64_t before = fixture_render(r, &other, &result);
+    other.lights[0].position[0] += 0.5f;
+    CHECK(fixture_render(r, &other, &result) != before);
+    CHECK(!result.shadow_inputs_reused);
+}
+
+/* The completed request, sent again, gives the same picture: it says all there is to say. */
+static void check_completed(struct pen_renderer *r, const uint8_t *id)
+{
+    struct pen_request request;
+    struct pen_result result, again;
+    fixture_request(&request, id, "pcss");
+    uint64_t first = fixture_render(r, &request, &result);
+    CHECK(result.completed.lights_given && result.completed.light_count == 1);
+    CHECK(result.completed.camera.mode == PEN_CAMERA_LOOK_AT);
+    CHECK(fixture_render(r, &result.completed, &again) == first);
+}
+
+static void check_eviction(void)
+{
+    struct pen_error error;
+    const uint64_t budget = 24ull << 20;
+    struct pen_renderer *r = fixture_renderer(PEN_DEVICE_AUTO, budget, &error);
+    uint8_t ids[4][PEN_ID_BYTES];
+    uint64_t first[4];
+    struct pen_request request;
+    struct pen_result result;
+    for (uint32_t i = 0; i < 4; i++) {
+        fixture_scene(r, PEN_GENERATED_HAIRBALL, 200000, i + 1, ids[i]);
+        fixture_request(&request, ids[i], "pcf");
+        first[i] = fixture_render(r, &request, &result);
+        CHECK(result.gpu_bytes <= budget && pen_renderer_gpu_bytes(r) <= budget);
+    }
+    CHECK(!pen_renderer_has_scene(r, ids[0])); /* least recently used */
+    CHECK(pen_renderer_has_scene(r, ids[3]));
+    for (uint32_t i = 0; i < 4; i++) {
+        if (!pen_renderer_has_scene(r, ids[i]))
+            fixture_scene(r, PEN_GENERATED_HAIRBALL, 200000, i + 1, ids[i]);
+        fixture_request(&request, ids[i], "pcf");
+        CHECK(fixture_render(r, &request, &result) == first[i]);
+    }
+    pen_renderer_destroy(r);
+}
+
+static void check_drop(struct pen_renderer *r, const uint8_t *id)
+{
+    pen_renderer_drop_scene(r, id);
+    CHECK(!pen_renderer_has_scene(r, id));
+    struct pen_request request;
+    struct pen_result result;
+    struct pen_frame frame;
+    struct pen_error error = {0};
+    fixture_request(&request, id, "none");
+    CHECK(!pen_renderer_render(r, &request, &frame, &result, &error));
+    CHECK(error.code == PEN_INTERNAL);
+}
+
+int main(void)
+{
+    struct pen_error error;
+    struct pen_renderer *r = fixture_renderer(PEN_DEVICE_AUTO, 0, &error);
+    if (!r)
+        return 77;
+    uint8_t id[PEN_ID_BYTES];
+    fixture_scene(r, PEN_GENERATED_DEMO, 0, 0, id);
+    check_repeats(r, id);
+    check_completed(r, id);
+    check_drop(r, id);
+    pen_renderer_destroy(r);
+    check_eviction();
+    CHECK_DONE();
+}

@@ -1,0 +1,442 @@
+/* Jobs: sample nets, threads, the adaptive mode, stopping, weighting, layouts, refusals; and what a
+ * camera sees. */
+#include "renderer/trace/internal.h"
+#include "tests/unit/trace_fixture.h"
+
+#define WIDTH 161
+#define HEIGHT 119
+#define PIXELS (WIDTH * HEIGHT)
+#define RINGS 48
+
+static const float wide[2] = {-8, 8};
+static const float center[3] = {0.2f, 0.7f, -0.1f};
+#define RADIUS 0.6f
+
+/* A sphere of triangles over a ground plane. */
+static struct pen_trace_scene *ball_scene(void)
+{
+    static float positions[(RINGS + 1) * (2 * RINGS + 1)][3];
+    static uint32_t indices[RINGS * 2 * RINGS * 6];
+    uint32_t count = 0, row = 2 * RINGS + 1;
+    struct psc_builder *builder = psc_builder_create();
+    for (uint32_t i = 0; i <= RINGS; i++)
+        for (uint32_t j = 0; j < row; j++) {
+            double theta = M_PI * i / RINGS, phi = M_PI * (j % (2 * RINGS)) / RINGS;
+            float *p = positions[i * row + j];
+            p[0] = (float)(sin(theta) * cos(phi)) * RADIUS + center[0];
+            p[1] = (float)cos(theta) * RADIUS + center[1];
+            p[2] = (float)(sin(theta) * sin(phi)) * RADIUS + center[2];
+        }
+    for (uint32_t i = 0; i < RINGS; i++)
+        for (uint32_t j = 0; j < 2 * RINGS; j++) {
+            uint32_t a = i * row + j, quad[6] = {a, a + 1, a + row, a + 1, a + row + 1, a + row};
+            memcpy(indices + count, quad, sizeof quad);
+            count += 6;
+        }
+    uint32_t material = add_plain_material(builder, false), primitive;
+    add_rectangle(builder, wide, wide, 0, false, material, identity);
+    struct psc_mesh mesh = {.positions = (const float(*)[3])positions,
+        .vertex_count = (RINGS + 1) * row,
+        .indices = indices,
+        .index_count = count,
+        .material = material};
+    CHECK(psc_builder_add_mesh(builder, &mesh, &primitive, NULL));
+    psc_builder_add_instance(builder, primitive, identity);
+    return finish_scene(builder, NULL);
+}
+
+struct picture {
+    float positions[PIXELS][3], normals[PIXELS][3], visibility[PIXELS][4], error[PIXELS];
+    uint32_t instances[PIXELS], triangles[PIXELS], samples[PIXELS];
+};
+
+static struct picture *take_picture(struct pen_trace_scene *scene)
+{
+    struct picture *p = calloc(1, sizeof *p);
+    struct pen_trace_camera camera = pen_trace_camera_look_at((const float[]){2, 2, 3},
+        (const float[]){0, 0.4f, 0}, (const float[]){0, 1, 0}, 45, WIDTH, HEIGHT);
+    struct pen_trace_hits hits = {p->positions[0], p->normals[0], p->instances, p->triangles};
+    struct pen_error error = {0};
+    CHECK(pen_trace_primary(scene, &camera, 0, &hits, &error));
+    return p;
+}
+
+static struct pen_trace_job job_for(const struct picture *p, uint32_t samples)
+{
+    return (struct pen_trace_job){.positions = p->positions[0],
+        .normals = p->normals[0],
+        .width = WIDTH,
+        .height = HEIGHT,
+        .samples = samples,
+        .seed = 3};
+}
+
+static struct pen_trace_stats run(struct pen_trace_scene *scene,
+    const struct pen_trace_light *light, const struct pen_trace_job *job, struct picture *p)
+{
+    struct pen_trace_result result = {p->visibility[0], p->error, p->samples};
+    struct pen_trace_stats stats = {0};
+    struct pen_error error = {0};
+    CHECK(pen_trace_visibility(scene, light, job, &result, &stats, &error));
+    CHECK_STR(error.message, "");
+    return stats;
+}
+
+/* Every elementary interval of area 1 / count holds one point; pairs share a cell. */
+static void test_nets(void)
+{
+    static uint32_t xs[4096], ys[4096];
+    static uint8_t taken[4096];
+    for (uint32_t bits = 0; bits <= 12; bits++)
+        for (uint32_t seed = 0; seed < 3; seed++) {
+            uint32_t count = 1u << bits, first = seed * count;
+            CHECK(trace_samples_net(first, count, seed * 77, xs, ys));
+            for (uint32_t split = 0; split <= bits; split++) {
+                memset(taken, 0, sizeof taken);
+                uint32_t full = 0;
+                for (uint32_t i = 0; i < count; i++) {
+                    uint32_t x = (uint32_t)((uint64_t)xs[i] << split >> 32);
+                    uint32_t y = (uint32_t)((uint64_t)ys[i] << (bits - split) >> 32);
+                    full += !taken[x << (bits - split) | y]++;
+                }
+                CHECK(full == count);
+            }
+            uint32_t x_bits = bits / 2, y_bits = bits ? (bits - 1) / 2 : 0;
+            for (uint32_t i = 0; i + 1 < count; i += 2)
+                CHECK(((uint64_t)(xs[i] ^ xs[i + 1]) << x_bits >> 32) == 0 &&
+                      ((uint64_t)(ys[i] ^ ys[i + 1]) << y_bits >> 32) == 0);
+        }
+}
+
+/* The estimated standard error is the true one within a factor: never below, at most 2.5 above. */
+static void test_error_estimate(void)
+{
+    struct psc_builder *builder = psc_builder_create();
+    const float x[2] = {-9, 0.1f};
+    const float turn[12] = {0.8f, 0, -0.6f, 0, 0, 1, 0, 0, 0.6f, 0, 0.8f, 0};
+    add_rectangle(builder, x, wide, 1.5f, false, add_plain_material(builder, false), turn);
+    struct pen_trace_scene *scene = finish_scene(builder, NULL);
+    struct receivers *r = grid_receivers((float[2]){-0.2f, 0.2f}, (float[2]){-0.2f, 0.2f});
+    struct receivers *truth = grid_receivers((float[2]){-0.2f, 0.2f}, (float[2]){-0.2f, 0.2f});
+    struct pen_trace_light light = downward_light(PEN_TRACE_RECT, 0.5f);
+    struct pen_trace_job job = job_of(truth, 16384);
+    trace(scene, &light, &job, truth);
+    for (uint32_t samples = 64; samples <= 1024; samples *= 4)
+        for (uint32_t target = 0; target < 2; target++) {
+            double squares = 0, estimate = 0;
+            job = job_of(r, samples);
+            job.target_error = target ? 1e-9f : 0; /* never reached: several nets, not one */
+            trace(scene, &light, &job, r);
+            for (int i = 0; i < GRID * GRID; i++) {
+                double d = (double)r->visibility[i][3] - (double)truth->visibility[i][3];
+                squares += d * d;
+                estimate += (double)r->error[i] * (double)r->error[i];
+            }
+            printf("%u samples: true error %.5f, estimated %.5f\n", samples,
+                sqrt(squares / (GRID * GRID)), sqrt(estimate / (GRID * GRID)));
+            CHECK(estimate > 0.9 * squares && estimate < 6.25 * squares);
+        }
+    free(r);
+    free(truth);
+    pen_trace_scene_destroy(scene);
+}
+
+static void test_threads_and_seeds(struct pen_trace_scene *scene, struct picture *p)
+{
+    struct pen_trace_light light = downward_light(PEN_TRACE_DISK, 0.4f);
+    struct picture *other = take_picture(scene);
+    for (int mode = 0; mode < 4; mode++) {
+        struct pen_trace_job job = job_for(p, 512);
+        job.adaptive = mode & 1;
+        job.target_error = mode & 2 ? 0.005f : 0;
+        job.threads = 1;
+        struct pen_trace_stats one = run(scene, &light, &job, p);
+        job.threads = 5;
+        struct pen_trace_stats five = run(scene, &light, &job, other);
+        CHECK(one.rays == five.rays && one.threads == 1 && five.threads == 5);
+        CHECK(!memcmp(p->visibility, other->visibility, sizeof p->visibility));
+        CHECK(!memcmp(p->error, other->error, sizeof p->error));
+        CHECK(!memcmp(p->samples, other->samples, sizeof p->samples));
+        job.seed++;
+        run(scene, &light, &job, other);
+        CHECK(memcmp(p->visibility, other->visibility, sizeof p->visibility));
+    }
+    free(other);
+}
+
+static void test_adaptive(struct pen_trace_scene *scene, struct picture *p)
+{
+    struct picture *other = take_picture(scene);
+    struct pen_trace_light light = downward_light(PEN_TRACE_RECT, 0.5f);
+    static const float texels[2 * 2 * 4] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 1, 1, 1, 0};
+    light.columns = light.rows = 2;
+    for (int mode = 0; mode < 4; mode++) {
+        struct pen_trace_job job = job_for(p, 256);
+        light.emission = mode & 1 ? texels : NULL;
+        job.weighting = mode & 2 ? PEN_TRACE_G : PEN_TRACE_AREA;
+        struct pen_trace_stats all = run(scene, &light, &job, p);
+        job.adaptive = true;
+        struct pen_trace_stats few = run(scene, &light, &job, other);
+        double squares = 0;
+        for (int i = 0; i < PIXELS; i++)
+            for (int c = 0; c < 4; c++) {
+                double d = (double)p->visibility[i][c] - (double)other->visibility[i][c];
+                squares += d * d / (4 * PIXELS);
+            }
+        printf("adaptive, mode %d: %.1f %% in full, %.1f %% of the rays, RMSE %.6f\n", mode,
+            100.0 * (double)few.full_receivers / (double)few.receivers,
+            100.0 * (double)few.rays / (double)all.rays, sqrt(squares));
+        CHECK(all.full_receivers == all.receivers && all.receivers == few.receivers);
+        CHECK(few.full_receivers * 2 < few.receivers && few.rays * 2 < all.rays);
+        CHECK(sqrt(squares) < 0.0005);
+    }
+    free(other);
+}
+
+static void test_target(struct pen_trace_scene *scene, struct picture *p)
+{
+    struct pen_trace_light light = downward_light(PEN_TRACE_RECT, 0.5f);
+    struct pen_trace_job job = job_for(p, 4096);
+    job.target_error = 0.002f;
+    struct pen_trace_stats stats = run(scene, &light, &job, p);
+    CHECK(stats.samples == 4096);
+    uint64_t spent = 0;
+    for (int i = 0; i < PIXELS; i++) {
+        if (p->samples[i] == 0)
+            continue;
+        CHECK(p->samples[i] >= 256 && p->samples[i] <= 4096);
+        CHECK(p->error[i] < 0.002f || p->samples[i] == 4096);
+        spent += p->samples[i];
+    }
+    printf("error below 0.002: %.0f samples on average\n", (double)spent / (double)stats.receivers);
+    CHECK(spent / stats.receivers < 1000);
+}
+
+/* Both weightings of a half-plane against sums over 400 x 400 light points. */
+static void test_weighting(void)
+{
+    struct psc_builder *builder = psc_builder_create();
+    add_rectangle(builder, (float[2]){-20, 0}, (float[2]){-20, 20}, 1, false,
+        add_plain_material(builder, false), identity);
+    struct pen_trace_scene *scene = finish_scene(builder, NULL);
+    struct pen_trace_light light = downward_light(PEN_TRACE_RECT, 1.2f);
+    static const float texels[2 * 4] = {1, 0.5f, 0, 1, 0, 0.5f, 2, 1};
+    light.emission = texels;
+    light.columns = 2;
+    light.rows = 1;
+    enum { COUNT = 6 };
+    float positions[COUNT][3] = {{0}}, normals[COUNT][4] = {{0}}, visibility[COUNT][4];
+    for (int i = 0; i < COUNT; i++) {
+        positions[i][0] = 0.1f * (float)(i - 2);
+        normals[i][0] = i < 3 ? 0 : 0.9f * (float)(i - 4);
+        normals[i][1] = 2; /* any length */
+    }
+    struct pen_trace_job job = {.positions = positions[0],
+        .normals = normals[0],
+        .normal_stride = 4,
+        .width = COUNT,
+        .height = 1,
+        .samples = 4096};
+    struct pen_trace_result result = {.visibility = visibility[0]};
+    for (job.weighting = PEN_TRACE_AREA; job.weighting <= PEN_TRACE_G; job.weighting++) {
+        CHECK(pen_trace_visibility(scene, &light, &job, &result, NULL, NULL));
+        for (int i = 0; i < COUNT; i++) {
+            double sum[4] = {0}, weights = 0, x = (double)positions[i][0];
+            for (int k = 0; k < 400 * 400; k++) {
+                double u = 1.2 * ((k % 400 + 0.5) / 200 - 1), v = 1.2 * ((k / 400 + 0.5) / 200 - 1);
+                double d[3] = {u - x, 3, v}, d2 = d[0] * d[0] + 9 + d[2] * d[2];
+                double cosine = (double)normals[i][0] * d[0] + (double)normals[i][1] * 3;
+                double w = job.weighting == PEN_TRACE_G ? fmax(cosine, 0) * 3 / (d2 * d2) : 1;
+                bool seen = cosine > 0 && x + d[0] / 3 > 0;
+                for (int c = 0; c < 4; c++)
+                    sum[c] += seen ? w * (c == 3 ? 1 : (double)texels[(u > 0) * 4 + c]) : 0;
+                weights += w;
+            }
+            for (int c = 0; c < 4; c++)
+                CHECK_NEAR((double)visibility[i][c], sum[c] / weights, 0.003);
+        }
+    }
+    pen_trace_scene_destroy(scene);
+}
+
+static void test_primary(struct pen_trace_scene *scene, const struct picture *p)
+{
+    int ball = 0, ground = 0, sky = 0;
+    for (int i = 0; i < PIXELS; i++) {
+        const float *x = p->positions[i], *n = p->normals[i];
+        double eye[3] = {2 - (double)x[0], 2 - (double)x[1], 3 - (double)x[2]};
+        if (p->instances[i] == PEN_TRACE_NONE) {
+            sky++;
+            CHECK(n[0] == 0 && n[1] == 0 && n[2] == 0 && p->triangles[i] == PEN_TRACE_NONE);
+            continue;
+        }
+        CHECK((double)n[0] * eye[0] + (double)n[1] * eye[1] + (double)n[2] * eye[2] > 0);
+        if (p->instances[i] == 0) {
+            ground++;
+            CHECK_NEAR((double)x[1], 0, 1e-5);
+            CHECK(n[1] == 1 && p->triangles[i] < 2);
+            continue;
+        }
+        double d[3], r2 = 0, along = 0;
+        for (int c = 0; c < 3; c++) {
+            d[c] = (double)(x[c] - center[c]);
+            r2 += d[c] * d[c];
+            along += d[c] * (double)n[c];
+        }
+        ball++; /* facets lie a little inside the sphere and tilt by half a step at most */
+        CHECK(sqrt(r2) < (double)RADIUS * 1.0001 && sqrt(r2) > (double)RADIUS * 0.997);
+        CHECK(along / sqrt(r2) > cos(1.5 * M_PI / RINGS));
+        CHECK(p->triangles[i] < RINGS * 2 * RINGS * 2);
+    }
+    CHECK(ball > PIXELS / 20 && ground > PIXELS / 10);
+    /* Every pixel's place projects to the pixel: seen from the eye, the picture's axes hold. */
+    struct pen_trace_camera camera = pen_trace_camera_look_at((const float[]){2, 2, 3},
+        (const float[]){0, 0.4f, 0}, (const float[]){0, 1, 0}, 45, WIDTH, HEIGHT);
+    for (int i = 0; i < PIXELS; i += 37) {
+        float d[3];
+        for (int c = 0; c < 3; c++)
+            d[c] = p->positions[i][c] - camera.eye[c];
+        if (p->instances[i] == PEN_TRACE_NONE)
+            continue;
+        double focal = HEIGHT / 2.0 / tan(M_PI / 8), z = (double)trace_dot(d, camera.forward);
+        CHECK_NEAR(
+            WIDTH / 2.0 + focal * (double)trace_dot(d, camera.right) / z, i % WIDTH + 0.5, 0.01);
+        CHECK_NEAR(
+            HEIGHT / 2.0 - focal * (double)trace_dot(d, camera.up) / z, i / WIDTH + 0.5, 0.01);
+    }
+    (void)scene;
+    (void)sky;
+}
+
+/* Positions as a depth buffer gives them: off along the view by up to 2^-17 of the distance. */
+static void test_depth_error(struct pen_trace_scene *scene, struct picture *p)
+{
+    struct picture *off = take_picture(scene);
+    struct pen_trace_light light = downward_light(PEN_TRACE_RECT, 0.5f);
+    const float eye[3] = {2, 2, 3};
+    double rmse[2];
+    struct pen_trace_job job = job_for(p, 64);
+    run(scene, &light, &job, p);
+    for (int i = 0; i < PIXELS; i++) {
+        float error = 0x1p-17f * (float)(i * 40503u % 65536u) / 32768 - 0x1p-17f;
+        for (int c = 0; c < 3; c++)
+            off->positions[i][c] += error * (off->positions[i][c] - eye[c]);
+    }
+    for (int fixed = 0; fixed < 2; fixed++) {
+        job = job_for(off, 64);
+        memcpy(job.eye, eye, sizeof eye);
+        job.depth_error = fixed ? 0x1p-16f : 0;
+        run(scene, &light, &job, off);
+        double squares = 0;
+        for (int i = 0; i < PIXELS; i++) {
+            double d = (double)(off->visibility[i][3] - p->visibility[i][3]);
+            squares += d * d;
+        }
+        rmse[fixed] = sqrt(squares / PIXELS);
+    }
+    printf("positions from depth: RMSE %.4f, lifted %.6f\n", rmse[0], rmse[1]);
+    CHECK(rmse[0] > 0.05 && rmse[1] < 0.002);
+    free(off);
+}
+
+/* A spot lights inside its cone only, and needs one ray a receiver. */
+static void test_spot(struct pen_trace_scene *scene)
+{
+    struct receivers *r = grid_receivers((float[2]){-3, 3}, (float[2]){3, 6});
+    struct pen_trace_light light = downward_light(PEN_TRACE_POINT, 0);
+    light.cos_cone = 0.6f;
+    struct pen_trace_job job = job_of(r, 64);
+    trace(scene, &light, &job, r);
+    int inside = 0;
+    for (int i = 0; i < GRID * GRID; i++) {
+        double x = (double)r->positions[i][0], z = (double)r->positions[i][2];
+        bool lit = (double)LIGHT_Y / sqrt(x * x + z * z + 9) > (double)light.cos_cone;
+        CHECK(r->visibility[i][3] == (lit ? 1 : 0) && r->error[i] == 0);
+        inside += lit;
+    }
+    CHECK(inside > 500 && inside < 3500);
+    free(r);
+}
+
+static void test_refusals(struct pen_trace_scene *scene, struct picture *p)
+{
+    struct pen_trace_light light = downward_light(PEN_TRACE_RECT, 0.5f);
+    struct pen_trace_result result = {.visibility = p->visibility[0]};
+    struct pen_trace_job good = job_for(p, 16), job;
+    struct pen_error error;
+#define REFUSED(code_, change)                                                                     \
+    do {                                                                                           \
+        job = good;                                                                                \
+        error = (struct pen_error){0};                                                             \
+        change;                                                                                    \
+        CHECK(!pen_trace_visibility(scene, &light, &job, &result, NULL, &error));                  \
+        CHECK(error.code == code_);                                                                \
+    } while (0)
+    REFUSED(PEN_UNPROCESSABLE, job.samples = 0);
+    REFUSED(PEN_UNPROCESSABLE, job.samples = 65537);
+    REFUSED(PEN_UNPROCESSABLE, job.width = 0);
+    REFUSED(PEN_UNPROCESSABLE, (job.width = 1 << 16, job.height = 1 << 15));
+    REFUSED(PEN_DEADLINE, job.deadline_ns = 1);
+    REFUSED(PEN_UNPROCESSABLE, light.half[1] = 0);
+    light.half[1] = NAN;
+    REFUSED(PEN_UNPROCESSABLE, (void)0);
+    light = downward_light(PEN_TRACE_POINT + 1, 1);
+    REFUSED(PEN_UNPROCESSABLE, (void)0);
+
+    /* What is no receiver is lit, whatever it holds. */
+    light = downward_light(PEN_TRACE_RECT, 0.5f);
+    const float positions[4][3] = {{NAN, 0, 0}, {0, 0, 0}, {0, 5, 0}, {0, 0.01f, 0}};
+    const float normals[4][3] = {{0, 1, 0}, {0, 0, 0}, {0, -1, 0}, {0, -1, 0}};
+    job = (struct pen_trace_job){
+        .positions = positions[0], .normals = normals[0], .width = 4, .height = 1, .samples = 16};
+    struct pen_trace_stats stats;
+    CHECK(pen_trace_visibility(scene, &light, &job, &result, &stats, NULL));
+    CHECK(p->visibility[0][3] == 1 && p->visibility[1][3] == 1);
+    /* Behind the one-sided light, and looking away from it: dark without a ray. */
+    CHECK(p->visibility[2][3] == 0 && p->visibility[3][3] == 0);
+    CHECK(stats.rays == 0 && stats.receivers == 2);
+
+    struct psc_builder *builder = psc_builder_create();
+    uint32_t material = add_plain_material(builder, true);
+    for (int i = 0; i < 100; i++)
+        add_rectangle(builder, wide, wide, (float)i, false, material, identity);
+    struct pen_trace_scene_options options = {.max_bytes = 20000};
+    static const uint8_t source[PEN_ID_BYTES];
+    struct psc_scene blob;
+    void *data;
+    size_t bytes;
+    CHECK(psc_builder_finish(builder, source, &data, &bytes, NULL));
+    CHECK(psc_open_memory(data, bytes, &blob, NULL));
+    struct pen_trace_scene *small = pen_trace_scene_create(&blob, &options, &error);
+    error = (struct pen_error){0};
+    if (small) { /* the triangles may fit, the hierarchy does not */
+        job = good;
+        CHECK(!pen_trace_visibility(small, &light, &job, &result, NULL, &error));
+        pen_trace_scene_destroy(small);
+    }
+    CHECK(error.code == PEN_TOO_LARGE);
+    options.max_bytes = 1000;
+    error = (struct pen_error){0};
+    CHECK(!pen_trace_scene_create(&blob, &options, &error) && error.code == PEN_TOO_LARGE);
+    free(data);
+    psc_builder_destroy(builder);
+}
+
+int main(void)
+{
+    test_nets();
+    test_error_estimate();
+    struct pen_trace_scene *scene = ball_scene();
+    struct picture *picture = take_picture(scene);
+    test_primary(scene, picture);
+    test_threads_and_seeds(scene, picture);
+    test_adaptive(scene, picture);
+    test_target(scene, picture);
+    test_weighting();
+    test_depth_error(scene, picture);
+    test_spot(scene);
+    test_refusals(scene, picture);
+    free(picture);
+    pen_trace_scene_destroy(scene);
+    CHECK_DONE();
+}

@@ -62,8 +62,8 @@ static bool build_depth(struct technique_run *run, const struct shadow_key *key,
     gl_timer_begin(&run->ctx->timer, PEN_STAGE_SHADOW, "shadow map");
     input->textures[0] = gl_texture_create(GL_DEPTH_COMPONENT32F, key->size, key->size, 0, 1);
     GLuint framebuffer = gl_framebuffer_create(NULL, 0, &input->textures[0]);
-    bool ok = pass_draw_casters(run, framebuffer, key->size, center, run->face->rect,
-        key->extra[0] == 0, error);
+    bool ok = pass_draw_casters(
+        run, framebuffer, key->size, center, run->face->rect, key->extra[0] == 0, error);
     gl.DeleteFramebuffers(1, &framebuffer);
     gl_timer_end(&run->ctx->timer);
     return ok;

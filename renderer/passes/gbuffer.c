@@ -29,8 +29,8 @@ static GLuint program(struct technique_ctx *ctx, const char *defines, struct pen
 
 static void set_matrix(GLuint program, const mat4 matrix)
 {
-    gl.ProgramUniformMatrix4fv(program, gl.GetUniformLocation(program, "to_clip"), 1, GL_FALSE,
-        (const float *)matrix);
+    gl.ProgramUniformMatrix4fv(
+        program, gl.GetUniformLocation(program, "to_clip"), 1, GL_FALSE, (const float *)matrix);
 }
 
 bool pass_gbuffer(struct technique_ctx *ctx, struct scene *scene, const struct view *view,
@@ -39,14 +39,14 @@ bool pass_gbuffer(struct technique_ctx *ctx, struct scene *scene, const struct v
     bool emission = scene->has_emission || scene->has_unlit;
     fit(g, view->width, view->height, emission);
     struct scene_pass pass = {.full = true};
-    pass.opaque =
-        program(ctx, emission ? "#define FULL\n#define EMIT\n" : "#define FULL\n", error);
+    pass.opaque = program(ctx, emission ? "#define FULL\n#define EMIT\n" : "#define FULL\n", error);
     pass.textured = program(ctx,
         emission ? "#define FULL\n#define EMIT\n#define TEXTURED\n"
                  : "#define FULL\n#define TEXTURED\n",
         error);
     GLuint flat = program(ctx,
-        emission ? "#define FULL\n#define EMIT\n#define GROUND\n" : "#define FULL\n#define GROUND\n",
+        emission ? "#define FULL\n#define EMIT\n#define GROUND\n"
+                 : "#define FULL\n#define GROUND\n",
         error);
     if (!pass.opaque || !pass.textured || !flat)
         return false;

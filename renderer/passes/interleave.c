@@ -7,7 +7,8 @@ bool pass_interleaved(
 {
     struct technique_ctx *ctx = run->ctx;
     char defines[512];
-    snprintf(defines, sizeof defines, "#define INTERLEAVED\n%s", pass->defines ? pass->defines : "");
+    snprintf(
+        defines, sizeof defines, "#define INTERLEAVED\n%s", pass->defines ? pass->defines : "");
     if (gl_texture_fit(&ctx->interleaved, GL_RG16F, run->width, run->height, 0, 1) ||
         !ctx->interleaved_framebuffer) {
         gl.DeleteFramebuffers(1, &ctx->interleaved_framebuffer);
@@ -25,8 +26,7 @@ bool pass_interleaved(
         .textures = &source,
         .texture_count = 1,
         .tiles = pass->tiles};
-    if (pass->tiles &&
-        !pass_fill_umbra(run, pass->tiles, ctx->interleaved_framebuffer, error))
+    if (pass->tiles && !pass_fill_umbra(run, pass->tiles, ctx->interleaved_framebuffer, error))
         return false;
     return pass_screen(run, &first, error) && pass_screen(run, &second, error);
 }

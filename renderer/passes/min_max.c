@@ -15,10 +15,9 @@ static bool build(struct technique_run *run, const struct shadow_key *key,
     gl.CreateFramebuffers(1, &framebuffer);
     bool ok = true;
     for (uint32_t level = 0; ok && level < pyramid->levels; level++) {
-        gl.NamedFramebufferTexture(
-            framebuffer, GL_COLOR_ATTACHMENT0, pyramid->name, (GLint)level);
-        struct pass_texture from = {UNIT_FREE, level ? pyramid->name : map->textures[0].name,
-            GL_SAMPLE_NEAREST};
+        gl.NamedFramebufferTexture(framebuffer, GL_COLOR_ATTACHMENT0, pyramid->name, (GLint)level);
+        struct pass_texture from = {
+            UNIT_FREE, level ? pyramid->name : map->textures[0].name, GL_SAMPLE_NEAREST};
         int32_t source_level[4] = {level ? (int32_t)level - 1 : 0};
         uint32_t width = side >> level ? side >> level : 1;
         ok = pass_fill(run->ctx,

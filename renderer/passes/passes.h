@@ -13,23 +13,23 @@ struct pass_texture {
  * and is compiled with the method's parameters as P(name). Writes run->vis_framebuffer unless
  * `framebuffer` is given. */
 struct pass_screen {
-    const char *name;    /* of the pass, for the timing record */
-    const char *body;    /* "pcss.glsl" */
-    const char *defines; /* or NULL */
+    const char *name;                /* of the pass, for the timing record */
+    const char *body;                /* "pcss.glsl" */
+    const char *defines;             /* or NULL */
     const struct gl_texture *shadow; /* depth map on UNIT_SHADOW, or NULL */
     const struct pass_texture *textures;
     uint32_t texture_count;
-    GLuint framebuffer; /* 0: run->vis_framebuffer */
-    bool add;           /* blends ONE, ONE instead of replacing */
+    GLuint framebuffer;             /* 0: run->vis_framebuffer */
+    bool add;                       /* blends ONE, ONE instead of replacing */
     const struct gl_texture *tiles; /* of pass_classify: only undecided tiles are drawn; or NULL */
-    const void *extra;  /* contents of the uniform block GL_UBO_EXTRA, or NULL */
+    const void *extra;              /* contents of the uniform block GL_UBO_EXTRA, or NULL */
     uint32_t extra_bytes;
 };
 bool pass_screen(
     struct technique_run *run, const struct pass_screen *pass, struct pen_error *error);
 
-/* As pass_screen, but over all pixels and without a Surface: the file `fragment` is a whole fragment
- * shader. Stage and framebuffer are the caller's choice. */
+/* As pass_screen, but over all pixels and without a Surface: the file `fragment` is a whole
+ * fragment shader. Stage and framebuffer are the caller's choice. */
 struct pass_fill {
     const char *name, *fragment, *defines;
     enum pen_stage stage;
@@ -43,8 +43,7 @@ struct pass_fill {
     const struct pen_technique_info *info; /* parameters for P(name), or NULL */
     const void *params;
 };
-bool pass_fill(
-    struct technique_ctx *ctx, const struct pass_fill *pass, struct pen_error *error);
+bool pass_fill(struct technique_ctx *ctx, const struct pass_fill *pass, struct pen_error *error);
 
 /* The accumulator ctx->sum (RGBA32F, the size of the picture), cleared to 0: the framebuffer of
  * passes that add. */
@@ -68,8 +67,8 @@ const struct shadow_input *pass_caster_map(
 bool pass_draw_casters(struct technique_run *run, GLuint framebuffer, uint32_t size,
     const float sample[2], const float rect[4], bool backdrops, struct pen_error *error);
 
-/* Min and max of linear z (metres from the light's plane; texels where nothing is: 1e30) over 2^k x 2^k
- * texels: RG32F with the whole mip chain in textures[0]; level 0 has half the map's side. */
+/* Min and max of linear z (metres from the light's plane; texels where nothing is: 1e30) over 2^k x
+ * 2^k texels: RG32F with the whole mip chain in textures[0]; level 0 has half the map's side. */
 const struct shadow_input *pass_min_max(
     struct technique_run *run, uint32_t size, struct pen_error *error);
 /* The same over pass_caster_map. */

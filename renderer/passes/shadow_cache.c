@@ -63,15 +63,14 @@ static void make_face_key(const struct light_face *face, struct face_key *key)
     key->shape = face->shape, key->parallel = face->parallel, key->cube = face->cube;
 }
 
-const struct shadow_input *shadow_cache_get(struct technique_run *run,
-    const struct shadow_key *key, shadow_build build, struct pen_error *error)
+const struct shadow_input *shadow_cache_get(struct technique_run *run, const struct shadow_key *key,
+    shadow_build build, struct pen_error *error)
 {
     struct shadow_cache *cache = run->ctx->shadows;
     struct face_key face;
     make_face_key(run->face, &face);
     for (struct entry *e = cache->entries; e; e = e->next)
-        if (e->scene == run->scene && e->key.size == key->size &&
-            !strcmp(e->key.kind, key->kind) &&
+        if (e->scene == run->scene && e->key.size == key->size && !strcmp(e->key.kind, key->kind) &&
             !memcmp(e->key.extra, key->extra, sizeof key->extra) &&
             !memcmp(&e->face, &face, sizeof face)) {
             e->last_frame = cache->frame;

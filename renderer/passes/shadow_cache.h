@@ -8,9 +8,9 @@
 /* What an input is. A kind of a new method is a string literal of its own: two inputs are the same
  * when kind, scene, light face, size and extra agree. */
 struct shadow_key {
-    const char *kind;   /* "depth", "minmax", ... */
-    uint32_t size;      /* map texels per side */
-    uint32_t extra[8];  /* whatever else the content depends on; bit patterns of floats too */
+    const char *kind;  /* "depth", "minmax", ... */
+    uint32_t size;     /* map texels per side */
+    uint32_t extra[8]; /* whatever else the content depends on; bit patterns of floats too */
 };
 
 struct shadow_input {
@@ -25,8 +25,8 @@ typedef bool (*shadow_build)(struct technique_run *run, const struct shadow_key 
     struct shadow_input *input, struct pen_error *error);
 
 /* The input, built by `build` when it is not there. Valid until the end of the frame. */
-const struct shadow_input *shadow_cache_get(struct technique_run *run,
-    const struct shadow_key *key, shadow_build build, struct pen_error *error);
+const struct shadow_input *shadow_cache_get(struct technique_run *run, const struct shadow_key *key,
+    shadow_build build, struct pen_error *error);
 
 /* For inputs that are filled bit by bit: something was drawn into one in this frame. */
 void shadow_cache_mark_built(struct shadow_cache *cache);

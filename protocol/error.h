@@ -26,7 +26,7 @@ struct pen_error {
     uint32_t code;      /* enum pen_code; PEN_OK: nothing went wrong */
     uint32_t retryable; /* 1: the same request may succeed later */
     char pointer[128];  /* RFC 6901 pointer into the request body, or "" */
-    char message[512];  /* one sentence for the client; never a path or an address of this process */
+    char message[512]; /* one sentence for the client; never a path or an address of this process */
 };
 
 /* Fills *e (which may be NULL) and returns false, so that a caller can `return pen_fail(...)`.

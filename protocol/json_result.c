@@ -84,8 +84,13 @@ char *pen_result_json(const struct pen_result *result, const struct pen_record_e
     for (int c = 0; c < 3; c++)
         pen_json_uint(&json, class_names[c], result->class_pixels[c]);
     pen_json_uint(&json, "full_work", result->full_work_pixels);
+    pen_json_array(&json, "subdivided");
+    for (int level = 0; level < 3; level++)
+        pen_json_uint(&json, NULL, result->subdivided_pixels[level]);
+    pen_json_end(&json);
     pen_json_end(&json);
     pen_json_uint(&json, "triangles_drawn", result->triangles_drawn);
+    pen_json_uint(&json, "rays", result->rays);
     pen_json_uint(&json, "shadow_maps", result->shadow_maps);
     pen_json_uint(&json, "gpu_bytes", result->gpu_bytes);
     pen_json_end(&json);

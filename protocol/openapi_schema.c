@@ -348,7 +348,8 @@ static const char *const answers[][2] = {
         "\"passes\":{\"type\":\"array\",\"items\":{\"type\":\"object\",\"properties\":{\"name\":"
         "{\"type\":\"string\"},\"stage\":{\"type\":\"string\"},\"count\":{\"type\":\"integer\"},"
         "\"ms\":{\"type\":\"number\"}}}},\"pixels\":{\"type\":\"object\",\"additionalProperties\":"
-        "{\"type\":\"integer\"}},\"triangles_drawn\":{\"type\":\"integer\"},\"gpu_bytes\":{"
+        "{\"type\":\"integer\"}},\"triangles_drawn\":{\"type\":\"integer\"},\"rays\":{\"type\":"
+        "\"integer\"},\"gpu_bytes\":{"
         "\"type\":"
         "\"integer\"}}}"},
 };

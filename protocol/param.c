@@ -85,8 +85,9 @@ bool pen_param_store(const struct pen_param *row, void *object, const double *va
         if (row->type == PEN_PARAM_FLOAT)
             stored = (float)v, low = (float)min, high = (float)max;
         if (stored < low || stored > high || (row->exclusive_min && stored <= low))
-            return pen_fail(error, PEN_UNPROCESSABLE, pointer, "%s is %g, but must lie in %c%g, %g].",
-                row->name, v, row->exclusive_min ? '(' : '[', min, max);
+            return pen_fail(error, PEN_UNPROCESSABLE, pointer,
+                "%s is %g, but must lie in %c%g, %g].", row->name, v,
+                row->exclusive_min ? '(' : '[', min, max);
     }
     for (uint32_t i = 0; i < row->count; i++)
         store(row, object, i, values[i]);
@@ -117,8 +118,8 @@ bool pen_param_parse(const struct pen_param *row, void *object, const char *text
             values[i] = strtod(at, &end);
             bool last = i + 1 == row->count;
             /* strtod also takes hexadecimal floats and leading space: neither is a number here. */
-            if (end == at || *end != (last ? '\0' : ',') || strspn(at, "+-.0123456789eE") <
-                    (size_t)(end - at))
+            if (end == at || *end != (last ? '\0' : ',') ||
+                strspn(at, "+-.0123456789eE") < (size_t)(end - at))
                 return pen_fail(error, PEN_UNPROCESSABLE, pointer, "%s must be %u number%s.",
                     row->name, row->count, row->count > 1 ? "s separated by commas" : "");
             at = end + 1;

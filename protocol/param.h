@@ -19,20 +19,20 @@ enum pen_param_type {
 };
 
 struct pen_param {
-    const char *name; /* the C field, the JSON key and the GLSL name */
-    const char *help; /* one sentence, ends with a full stop */
-    const char *unit; /* "m", "px", "deg", "texel", ...; NULL: none */
+    const char *name;           /* the C field, the JSON key and the GLSL name */
+    const char *help;           /* one sentence, ends with a full stop */
+    const char *unit;           /* "m", "px", "deg", "texel", ...; NULL: none */
     const char *const *choices; /* NULL-terminated names of an enumeration, or NULL */
     union {
         double def;      /* scalar default */
         double def_v[4]; /* vector default (count > 1) */
     };
-    double min, max;     /* inclusive, for every component */
-    uint32_t applies;    /* bit mask of the light types or camera modes that have this row; 0: all */
-    uint16_t offset;     /* bytes from the start of the struct */
-    uint8_t type;        /* enum pen_param_type */
-    uint8_t count;       /* components, 1 to 4 */
-    uint8_t specialise;  /* 1: a compile-time constant of the shader, part of its cache key */
+    double min, max;    /* inclusive, for every component */
+    uint32_t applies;   /* bit mask of the light types or camera modes that have this row; 0: all */
+    uint16_t offset;    /* bytes from the start of the struct */
+    uint8_t type;       /* enum pen_param_type */
+    uint8_t count;      /* components, 1 to 4 */
+    uint8_t specialise; /* 1: a compile-time constant of the shader, part of its cache key */
     uint8_t exclusive_min; /* 1: min itself is not allowed */
 };
 

@@ -36,7 +36,8 @@ static const struct pen_param request_rows[] = {
     REQUEST(antialias, .def = 1, .min = 1, .max = PEN_MAX_ANTIALIAS, .unit = "frames",
         .help = "Jittered frames averaged into the image."),
     REQUEST(classify, .def = 1,
-        .help = "Skips pixels that a min-max pyramid proves lit or in umbra, where the method can."),
+        .help =
+            "Skips pixels that a min-max pyramid proves lit or in umbra, where the method can."),
     REQUEST(time_s, .def = 0, .min = 0, .max = 1e6, .unit = "s",
         .help = "Time at which animated emission is shown."),
 };
@@ -87,7 +88,8 @@ static const struct pen_param light_rows[] = {
     LIGHT(inner_cone_deg, .def = 0, .min = 0, .max = 89, .unit = "deg",
         .applies = PEN_LIGHT_BIT(PEN_LIGHT_SPOT), .help = "Half angle of full intensity."),
     LIGHT(outer_cone_deg, .def = 45, .min = 0, .max = 89, .exclusive_min = 1, .unit = "deg",
-        .applies = PEN_LIGHT_BIT(PEN_LIGHT_SPOT), .help = "Half angle where intensity reaches zero."),
+        .applies = PEN_LIGHT_BIT(PEN_LIGHT_SPOT),
+        .help = "Half angle where intensity reaches zero."),
     LIGHT(color, .def_v = {1, 1, 1}, .max = 1e3, .help = "Linear RGB factor of the emission."),
     LIGHT(power_w, .def = 100, .min = 0, .max = 1e9, .unit = "W", .applies = EMITTER | PUNCTUAL,
         .help = "Radiant flux; 0 uses radiance instead."),
@@ -201,7 +203,8 @@ bool pen_request_check(const struct pen_request *request, const struct pen_catal
     struct pen_error *error)
 {
     if (memchr(request->technique, 0, sizeof request->technique) == NULL)
-        return pen_fail(error, PEN_UNPROCESSABLE, "/technique/name", "The method has no valid name.");
+        return pen_fail(
+            error, PEN_UNPROCESSABLE, "/technique/name", "The method has no valid name.");
     const struct pen_technique_info *info = pen_catalogue_find(catalogue, request->technique);
     if (!info)
         return pen_fail(error, PEN_UNPROCESSABLE, "/technique/name",
@@ -224,8 +227,8 @@ bool pen_request_check(const struct pen_request *request, const struct pen_catal
         return pen_fail(error, PEN_UNPROCESSABLE, "/camera",
             "The camera needs an eye and a target that differ, and an up vector that is not zero.");
     if (request->light_count > PEN_MAX_LIGHTS)
-        return pen_fail(error, PEN_UNPROCESSABLE, "/lights", "At most %d lights are allowed.",
-            PEN_MAX_LIGHTS);
+        return pen_fail(
+            error, PEN_UNPROCESSABLE, "/lights", "At most %d lights are allowed.", PEN_MAX_LIGHTS);
     for (uint32_t i = 0; i < request->light_count; i++) {
         const struct pen_light *light = &request->lights[i];
         char pointer[32] = "/lights/0";
@@ -241,18 +244,19 @@ bool pen_request_check(const struct pen_request *request, const struct pen_catal
         if (light->type == PEN_LIGHT_SPOT && light->inner_cone_deg >= light->outer_cone_deg)
             return pen_fail(error, PEN_UNPROCESSABLE, pointer,
                 "inner_cone_deg must be smaller than outer_cone_deg.");
-        if (light->texture > PEN_TEXTURE_PATTERN || (light->texture == PEN_TEXTURE_PATTERN &&
+        if (light->texture > PEN_TEXTURE_PATTERN ||
+            (light->texture == PEN_TEXTURE_PATTERN &&
                 light->pattern >= sizeof pen_pattern_names / sizeof *pen_pattern_names - 1))
             return pen_fail(error, PEN_UNPROCESSABLE, pointer, "Unknown emission pattern.");
         if (light->texture && light->type != PEN_LIGHT_RECT)
-            return pen_fail(error, PEN_UNPROCESSABLE, pointer,
-                "Only rect lights take an emission texture.");
+            return pen_fail(
+                error, PEN_UNPROCESSABLE, pointer, "Only rect lights take an emission texture.");
     }
     const struct pen_output *output = &request->output;
     uint32_t bits = output->bit_depth;
     bool depth_ok = bits == 0 || (bits == 8 && output->format != PEN_EXR) ||
-        (bits == 16 && output->format != PEN_JPEG && output->format != PEN_WEBP) ||
-        (bits == 32 && output->format == PEN_EXR);
+                    (bits == 16 && output->format != PEN_JPEG && output->format != PEN_WEBP) ||
+                    (bits == 32 && output->format == PEN_EXR);
     if (!depth_ok)
         return pen_fail(error, PEN_UNPROCESSABLE, "/output/bit_depth",
             "%s cannot have %u bits per channel.", pen_format_names[output->format], bits);

@@ -18,22 +18,22 @@ enum pen_light_type {
 enum pen_light_texture { PEN_TEXTURE_NONE, PEN_TEXTURE_IMAGE, PEN_TEXTURE_PATTERN };
 
 struct pen_light {
-    uint32_t type;      /* enum pen_light_type */
-    float position[3];  /* m, world; the centre of the emitter (sun: only the direction counts) */
-    float target[3];    /* m, world */
-    float up[3];        /* the emitter's +y is the part of `up` across its axis */
-    float width;        /* m */
-    float height;       /* m */
-    float radius;       /* m */
+    uint32_t type;     /* enum pen_light_type */
+    float position[3]; /* m, world; the centre of the emitter (sun: only the direction counts) */
+    float target[3];   /* m, world */
+    float up[3];       /* the emitter's +y is the part of `up` across its axis */
+    float width;       /* m */
+    float height;      /* m */
+    float radius;      /* m */
     float angular_diameter_deg;
     float inner_cone_deg; /* half angles, as in KHR_lights_punctual */
     float outer_cone_deg;
-    float color[3];     /* linear RGB factor */
-    float power_w;      /* radiant flux, W; 0: use radiance / irradiance */
-    float radiance;     /* W m^-2 sr^-1 */
-    float irradiance;   /* sun: W m^-2 on a surface that faces it */
-    uint32_t texture;   /* enum pen_light_texture */
-    uint32_t pattern;   /* index into pen_pattern_names when texture is PEN_TEXTURE_PATTERN */
+    float color[3];   /* linear RGB factor */
+    float power_w;    /* radiant flux, W; 0: use radiance / irradiance */
+    float radiance;   /* W m^-2 sr^-1 */
+    float irradiance; /* sun: W m^-2 on a surface that faces it */
+    uint32_t texture; /* enum pen_light_texture */
+    uint32_t pattern; /* index into pen_pattern_names when texture is PEN_TEXTURE_PATTERN */
     uint8_t image[PEN_ID_BYTES]; /* emission image when texture is PEN_TEXTURE_IMAGE */
 };
 
@@ -41,15 +41,15 @@ enum pen_camera_mode { PEN_CAMERA_AUTO, PEN_CAMERA_LOOK_AT, PEN_CAMERA_INDEX, PE
 #define PEN_CAMERA_BIT(m) (1u << (m))
 
 struct pen_camera {
-    uint32_t mode;     /* enum pen_camera_mode */
-    uint32_t index;    /* of the scene's cameras */
-    float eye[3];      /* m, world */
-    float target[3];   /* m, world */
+    uint32_t mode;   /* enum pen_camera_mode */
+    uint32_t index;  /* of the scene's cameras */
+    float eye[3];    /* m, world */
+    float target[3]; /* m, world */
     float up[3];
     float fov_y_deg;
     float azimuth_deg; /* orbit: from +z towards +x, around the centre of the bounds */
     float elevation_deg;
-    float distance;    /* m; 0: frames the bounds */
+    float distance; /* m; 0: frames the bounds */
 };
 
 enum pen_layer {
@@ -59,8 +59,8 @@ enum pen_layer {
     PEN_LAYER_DEPTH,      /* distance along the view axis, m */
     PEN_LAYER_NORMAL,     /* world-space shading normal */
     PEN_LAYER_ALBEDO,
-    PEN_LAYER_POSITION,   /* world, m */
-    PEN_LAYER_ALL,        /* EXR only: all of the above in one file */
+    PEN_LAYER_POSITION, /* world, m */
+    PEN_LAYER_ALL,      /* EXR only: all of the above in one file */
     PEN_LAYERS
 };
 enum pen_format { PEN_PNG, PEN_EXR, PEN_JPEG, PEN_WEBP, PEN_TIFF, PEN_FORMATS };
@@ -82,22 +82,22 @@ struct pen_delivery { /* how the answer is wanted; no pixel depends on it */
 
 struct pen_request {
     uint8_t scene[PEN_ID_BYTES];
-    char technique[PEN_TECHNIQUE_NAME_BYTES]; /* zero-padded */
+    char technique[PEN_TECHNIQUE_NAME_BYTES];                 /* zero-padded */
     uint32_t technique_params[PEN_TECHNIQUE_PARAM_BYTES / 4]; /* the method's own struct */
-    uint32_t width, height; /* px */
+    uint32_t width, height;                                   /* px */
     struct pen_camera camera;
     uint32_t lights_given; /* 0: the scene's own, else one that suits the bounds */
     uint32_t light_count;
     struct pen_light lights[PEN_MAX_LIGHTS];
-    pen_flag ground;       /* a receiver under the bounds */
+    pen_flag ground; /* a receiver under the bounds */
     float ground_albedo[3];
-    float ambient[3];      /* W m^-2 sr^-1, uniform */
-    float background[3];   /* W m^-2 sr^-1 where nothing is hit */
-    float exposure_ev;     /* stops */
-    uint32_t tone_map;     /* enum pen_tone_map */
-    uint32_t antialias;    /* jittered frames per image */
-    pen_flag classify;     /* skip pixels whose answer the min-max pyramid already proves */
-    float time_s;          /* selects the frame of animated emission */
+    float ambient[3];    /* W m^-2 sr^-1, uniform */
+    float background[3]; /* W m^-2 sr^-1 where nothing is hit */
+    float exposure_ev;   /* stops */
+    uint32_t tone_map;   /* enum pen_tone_map */
+    uint32_t antialias;  /* jittered frames per image */
+    pen_flag classify;   /* skip pixels whose answer the min-max pyramid already proves */
+    float time_s;        /* selects the frame of animated emission */
     struct pen_output output;
     struct pen_delivery delivery; /* must stay last: see PEN_REQUEST_KEY_BYTES */
 };

@@ -4,7 +4,7 @@
 
 enum pen_stage {
     PEN_STAGE_QUEUE,
-    PEN_STAGE_LOAD,      /* scene and images into GPU memory */
+    PEN_STAGE_LOAD, /* scene and images into GPU memory */
     PEN_STAGE_GBUFFER,
     PEN_STAGE_SHADOW,    /* shadow inputs: depth maps, pyramids, SATs */
     PEN_STAGE_TECHNIQUE, /* the method's own screen passes */
@@ -40,13 +40,17 @@ struct pen_result {
     struct pen_pass_time passes[PEN_MAX_PASSES];
     uint32_t scene_was_resident;
     uint32_t shadow_inputs_reused;
-    uint32_t class_pixels[3];     /* lit, penumbra, umbra; all 0 when not classified */
-    uint32_t full_work_pixels;    /* pixels for which the method ran in full */
+    uint32_t class_pixels[3];  /* lit, penumbra, umbra; all 0 when not classified */
+    uint32_t full_work_pixels; /* pixels for which the method ran in full */
+    /* Receivers whose filter was split 0, 1, 2 times, summed over lights and jittered frames,
+     * without those that the classifier decided; all 0 for methods that split nothing. */
+    uint32_t subdivided_pixels[3];
     uint32_t triangles_drawn;
-    uint32_t shadow_maps;         /* depth maps of light samples that the image rests on, drawn or kept;
-                                     summed over lights and jittered frames */
-    uint64_t gpu_bytes;           /* resident scenes, images and shadow inputs */
-    uint64_t image_bytes;         /* encoded size */
+    uint32_t shadow_maps; /* depth maps of light samples that the image rests on, drawn or kept;
+                             summed over lights and jittered frames */
+    uint64_t rays;        /* of methods that trace */
+    uint64_t gpu_bytes;   /* resident scenes, images and shadow inputs */
+    uint64_t image_bytes; /* encoded size */
 };
 void pen_result_warn(struct pen_result *result, const char *format, ...)
     __attribute__((format(printf, 2, 3)));

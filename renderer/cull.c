@@ -37,7 +37,7 @@ static void to_object(const struct cull_view *view, const struct psc_instance *i
         glm_vec4_scale(out->planes[i], length > 0 ? 1 / length : 1, out->planes[i]);
     }
     out->cone = view->cull_back && !double_sided && !(instance->flags & PSC_MIRRORED) &&
-        fabsf(glm_mat4_det(world)) > 1e-20f;
+                fabsf(glm_mat4_det(world)) > 1e-20f;
     if (!out->cone)
         return;
     glm_mat4_inv(world, inverse);
@@ -60,11 +60,11 @@ static bool is_visible(
     const float *axis = meshlet->cone_axis;
     if (parallel)
         return view->eye[0] * axis[0] + view->eye[1] * axis[1] + view->eye[2] * axis[2] <
-            meshlet->cone_cutoff;
+               meshlet->cone_cutoff;
     float d[3] = {c[0] - view->eye[0], c[1] - view->eye[1], c[2] - view->eye[2]};
     float distance = sqrtf(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
     return d[0] * axis[0] + d[1] * axis[1] + d[2] * axis[2] <
-        meshlet->cone_cutoff * distance + meshlet->radius;
+           meshlet->cone_cutoff * distance + meshlet->radius;
 }
 
 uint64_t cull_instance(const struct cull_view *view, const struct psc_scene *blob,
@@ -85,8 +85,7 @@ uint64_t cull_instance(const struct cull_view *view, const struct psc_scene *blo
             continue;
         }
         run = &commands[(*count)++];
-        *run = (struct cull_command){
-            meshlet->index_count, 1, meshlet->first_index, 0, instance};
+        *run = (struct cull_command){meshlet->index_count, 1, meshlet->first_index, 0, instance};
     }
     return indices / 3;
 }

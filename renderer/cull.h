@@ -8,7 +8,7 @@ struct cull_view {
     mat4 world_to_clip; /* 0 <= z <= w is inside */
     float eye[3];       /* world; parallel: unit direction of view instead */
     bool parallel;
-    bool cull_back;     /* drop meshlets of single-sided materials that face away */
+    bool cull_back; /* drop meshlets of single-sided materials that face away */
 };
 
 /* As DrawElementsIndirectCommand. */

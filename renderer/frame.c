@@ -24,10 +24,12 @@ struct frame {
     const struct frame_job *job;
     struct view view;
     struct light lights[PEN_MAX_LIGHTS];
+    const struct emission *emissions[PEN_MAX_LIGHTS]; /* NULL: no texture */
     uint32_t light_count;
     GLuint view_buffer;
     struct pen_result *result;
     uint64_t triangles;
+    uint32_t number; /* of the jittered frame */
 };
 
 static void release(GLuint *framebuffer, struct gl_texture *texture)
@@ -55,7 +57,8 @@ void frame_targets_finish(struct frame_targets *t)
     memset(t, 0, sizeof *t);
 }
 
-static void fit_sum(struct gl_texture *texture, GLuint *framebuffer, uint32_t width, uint32_t height)
+static void fit_sum(
+    struct gl_texture *texture, GLuint *framebuffer, uint32_t width, uint32_t height)
 {
     static const float zero[4] = {0};
     if (gl_texture_fit(texture, GL_RGBA32F, width, height, 0, 1) || !*framebuffer) {
@@ -130,6 +133,34 @@ static void jitter(uint32_t index, float *x, float *y)
     *x = at[0] - 0.5f, *y = at[1] - 0.5f;
 }
 
+static bool resolve_emissions(struct frame *f, struct pen_error *error)
+{
+    const struct frame_job *job = f->job;
+    const struct pen_technique_info *info = &job->technique->info;
+    bool averaged = false;
+    for (uint32_t i = 0; i < f->light_count; i++) {
+        const struct pen_light *source = f->lights[i].source;
+        if (source->texture == PEN_TEXTURE_NONE)
+            continue;
+        const struct scene *image =
+            source->texture == PEN_TEXTURE_IMAGE ? job->find_image(job->owner, source) : NULL;
+        f->emissions[i] =
+            emission_cache_get(job->emissions, source, image, job->request->time_s, error);
+        if (!f->emissions[i])
+            return false;
+        for (uint32_t k = 0; k < f->lights[i].face_count; k++) {
+            f->lights[i].faces[k].textured = 1;
+            memcpy(f->lights[i].faces[k].emission_mean, f->emissions[i]->mean, 12);
+        }
+        averaged |= !info->textured;
+    }
+    if (averaged)
+        pen_result_warn(f->result,
+            "%s knows one visibility per light: textured lights shine in their mean colour.",
+            info->title);
+    return true;
+}
+
 static bool record_face(
     struct frame *f, uint32_t light, struct light_face *face, struct pen_error *error)
 {
@@ -139,7 +170,7 @@ static bool record_face(
     gl.NamedBufferData(ctx->light_block, sizeof *face, face, GL_STREAM_DRAW);
     gl.BindBufferBase(GL_UNIFORM_BUFFER, GL_UBO_LIGHT, ctx->light_block);
     gl.BindBufferBase(GL_UNIFORM_BUFFER, GL_UBO_PARAMS, ctx->param_block);
-    const struct gl_texture *emission = job->find_image(job->owner, f->lights[light].source);
+    const struct emission *emission = f->emissions[light];
     struct technique_run run = {.ctx = ctx,
         .scene = job->scene,
         .view = &f->view,
@@ -151,21 +182,22 @@ static bool record_face(
         .params = job->request->technique_params,
         .state = job->technique_state,
         .vis_framebuffer = job->targets->vis_framebuffers[light],
-        .emission = emission ? emission : &ctx->white,
+        .emission = emission ? &emission->texture : &ctx->white,
         .result = f->result,
         .width = job->request->width,
-        .height = job->request->height};
+        .height = job->request->height,
+        .frame = f->number};
     return job->technique->record(&run, error);
 }
 
 static bool record_visibility(struct frame *f, struct pen_error *error)
 {
-    static const float one[4] = {1, 1, 1, 1};
     const struct frame_job *job = f->job;
     gl.NamedBufferData(job->ctx->param_block, sizeof job->request->technique_params,
         job->request->technique_params, GL_STREAM_DRAW);
     for (uint32_t i = 0; i < f->light_count; i++) {
-        gl.ClearNamedFramebufferfv(job->targets->vis_framebuffers[i], GL_COLOR, 0, one);
+        gl.ClearNamedFramebufferfv(job->targets->vis_framebuffers[i], GL_COLOR, 0,
+            f->lights[i].faces[0].emission_mean); /* what an unshadowed receiver sees */
         for (uint32_t k = 0; k < f->lights[i].face_count; k++)
             if (!record_face(f, i, &f->lights[i].faces[k], error))
                 return false;
@@ -261,11 +293,12 @@ static bool render_jittered(struct frame *f, uint32_t number, struct pen_error *
 {
     const struct pen_request *r = f->job->request;
     bool beauty = frame_output_needs_beauty(r), visibility = frame_output_needs_visibility(r);
+    f->number = number;
     upload_view(f, number);
     return pass_gbuffer(f->job->ctx, f->job->scene, &f->view, r->ground.on,
                &f->job->targets->gbuffer, &f->triangles, error) &&
-        (!(beauty || visibility) || record_visibility(f, error)) &&
-        (!beauty || shade(f, error)) && (!visibility || add_visibility(f, error));
+           (!(beauty || visibility) || record_visibility(f, error)) &&
+           (!beauty || shade(f, error)) && (!visibility || add_visibility(f, error));
 }
 
 bool frame_render(const struct frame_job *job, struct pen_frame *frame, struct pen_result *result,
@@ -280,6 +313,8 @@ bool frame_render(const struct frame_job *job, struct pen_frame *frame, struct p
     if (!view_resolve(&f.view, &r->camera, job->scene, r->width, r->height, error))
         return false;
     f.light_count = lights_resolve(f.lights, r, job->scene, result);
+    if (!resolve_emissions(&f, error))
+        return false;
     fit_targets(&f);
     gl.CreateBuffers(1, &f.view_buffer);
     for (uint32_t i = 0; i < r->antialias; i++) {
@@ -298,6 +333,8 @@ bool frame_render(const struct frame_job *job, struct pen_frame *frame, struct p
     result->triangles_drawn = (uint32_t)f.triangles;
     ok = true;
 done:
+    if (job->technique->finish)
+        job->technique->finish(job->ctx, job->technique_state, result);
     gl.DeleteBuffers(1, &f.view_buffer);
     return ok;
 }

@@ -1,5 +1,6 @@
 /* One image: the list of passes from geometry to finished pixels. */
 #pragma once
+#include "renderer/emission.h"
 #include "renderer/renderer.h"
 #include "renderer/technique.h"
 
@@ -21,7 +22,8 @@ struct frame_job {
     struct pen_request *request; /* completed while rendering */
     const struct technique *technique;
     void *technique_state;
-    const struct gl_texture *(*find_image)(void *owner, const struct pen_light *light);
+    struct emission_cache *emissions;
+    const struct scene *(*find_image)(void *owner, const struct pen_light *light);
     void *owner;
 };
 

@@ -13,7 +13,7 @@ bool frame_output_needs_beauty(const struct pen_request *r)
 bool frame_output_needs_visibility(const struct pen_request *r)
 {
     return r->output.layer == PEN_LAYER_VISIBILITY || r->output.layer == PEN_LAYER_PENUMBRA ||
-        r->output.layer == PEN_LAYER_ALL;
+           r->output.layer == PEN_LAYER_ALL;
 }
 
 static enum pen_pixel pixel_of(const struct pen_output *output, uint32_t layer)
@@ -29,7 +29,7 @@ static enum pen_pixel pixel_of(const struct pen_output *output, uint32_t layer)
 bool frame_output_is_direct(const struct pen_request *r)
 {
     return r->output.layer == PEN_LAYER_BEAUTY && r->antialias == 1 &&
-        pixel_of(&r->output, PEN_LAYER_BEAUTY) == PEN_PIXEL_RGBA8;
+           pixel_of(&r->output, PEN_LAYER_BEAUTY) == PEN_PIXEL_RGBA8;
 }
 
 static const GLenum internal_formats[] = {GL_RGBA8, GL_RGBA16F, GL_RGBA32F};
@@ -67,8 +67,8 @@ static void make_block(const struct frame_job *job, const struct view *view, str
         distance += (center[i] - view->eye[i]) * view->forward[i];
     }
     b->bounds_min[3] = fmaxf(distance - radius, 0);
-    b->bounds_max[3] = distance + radius > b->bounds_min[3] ? distance + radius
-                                                            : b->bounds_min[3] + radius;
+    b->bounds_max[3] =
+        distance + radius > b->bounds_min[3] ? distance + radius : b->bounds_min[3] + radius;
 }
 
 static bool convert(const struct frame_job *job, const struct output_block *block, uint32_t layer,
@@ -97,15 +97,15 @@ static bool convert(const struct frame_job *job, const struct output_block *bloc
         error);
 }
 
-static void read_plane(const struct frame_job *job, enum pen_pixel pixel, uint32_t layer,
-    struct pen_frame *frame)
+static void read_plane(
+    const struct frame_job *job, enum pen_pixel pixel, uint32_t layer, struct pen_frame *frame)
 {
     struct pen_plane *plane = &frame->planes[frame->plane_count++];
     snprintf(plane->name, sizeof plane->name, "%s", pen_layer_names[layer]);
     plane->pixel = pixel;
-    plane->channels = layer == PEN_LAYER_DEPTH || layer == PEN_LAYER_PENUMBRA ? 1
-        : layer == PEN_LAYER_VISIBILITY && pixel != PEN_PIXEL_RGBA8         ? 4
-                                                                            : 3;
+    plane->channels = layer == PEN_LAYER_DEPTH || layer == PEN_LAYER_PENUMBRA     ? 1
+                      : layer == PEN_LAYER_VISIBILITY && pixel != PEN_PIXEL_RGBA8 ? 4
+                                                                                  : 3;
     plane->data = malloc((size_t)frame->width * frame->height * pixel_bytes[pixel]);
     if (!plane->data)
         abort();

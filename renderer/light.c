@@ -6,7 +6,8 @@
  * light: tan 80 degrees. */
 #define MAX_SLOPE 5.67f
 
-static void make_axes(const float direction[3], const float up[3], float x[3], float y[3], float z[3])
+static void make_axes(
+    const float direction[3], const float up[3], float x[3], float y[3], float z[3])
 {
     glm_vec3_normalize_to((float *)direction, z);
     glm_vec3_cross((float *)up, z, x);
@@ -19,8 +20,8 @@ static void make_axes(const float direction[3], const float up[3], float x[3], f
     glm_vec3_cross(z, x, y);
 }
 
-static void set_axes(struct light_face *f, const float o[3], const float x[3], const float y[3],
-    const float z[3])
+static void set_axes(
+    struct light_face *f, const float o[3], const float x[3], const float y[3], const float z[3])
 {
     mat4 m = {{x[0], y[0], z[0], 0}, {x[1], y[1], z[1], 0}, {x[2], y[2], z[2], 0},
         {-glm_vec3_dot((float *)x, (float *)o), -glm_vec3_dot((float *)y, (float *)o),
@@ -131,13 +132,14 @@ static void geometry_range(const struct light_face *f, const struct scene *scene
         box_range(f, bounds, box);
         for (int k = 0; k < 4; k++) /* row z of world_to_light * world */
             row[k] = f->world_to_light[0][2] * instance->world[k] +
-                f->world_to_light[1][2] * instance->world[4 + k] +
-                f->world_to_light[2][2] * instance->world[8 + k] +
-                (k == 3 ? f->world_to_light[3][2] : 0);
+                     f->world_to_light[1][2] * instance->world[4 + k] +
+                     f->world_to_light[2][2] * instance->world[8 + k] +
+                     (k == 3 ? f->world_to_light[3][2] : 0);
         float scale = sqrtf(row[0] * row[0] + row[1] * row[1] + row[2] * row[2]);
         for (uint32_t k = 0; k < p->meshlet_count; k++) {
             const struct psc_meshlet *m = &scene->blob.meshlets[p->first_meshlet + k];
-            float z = row[0] * m->center[0] + row[1] * m->center[1] + row[2] * m->center[2] + row[3];
+            float z =
+                row[0] * m->center[0] + row[1] * m->center[1] + row[2] * m->center[2] + row[3];
             float near_z = fmaxf(z - scale * m->radius, box[0]);
             float far_z = fminf(z + scale * m->radius, box[1]);
             if (far_z <= 0)
@@ -157,8 +159,7 @@ static void fit_range(struct light_face *f, const struct scene *scene)
     f->far_z = range[1] * 1.001f + 1e-6f;
     /* Nearer casters are kept by depth clamping, at the near plane's depth. */
     float least = f->parallel ? -INFINITY : fmaxf(f->far_z * 1e-3f, 1e-5f);
-    f->near_z = fminf(
-        fmaxf(range[0] * (range[0] > 0 ? 0.999f : 1.001f), least), 0.999f * f->far_z);
+    f->near_z = fminf(fmaxf(range[0] * (range[0] > 0 ? 0.999f : 1.001f), least), 0.999f * f->far_z);
 }
 
 void light_face_window(
@@ -214,8 +215,7 @@ void light_face_window(
     }
 }
 
-void light_face_clip(
-    const struct light_face *f, const float sample[2], const float rect[4], mat4 m)
+void light_face_clip(const struct light_face *f, const float sample[2], const float rect[4], mat4 m)
 {
     float n = f->near_z, r = f->far_z;
     float w = rect[2] - rect[0], h = rect[3] - rect[1];
@@ -236,8 +236,8 @@ void light_face_clip(
     m[2][3] = 1;
 }
 
-void light_face_cull(const struct light_face *f, const float sample[2], const float rect[4],
-    struct cull_view *cull)
+void light_face_cull(
+    const struct light_face *f, const float sample[2], const float rect[4], struct cull_view *cull)
 {
     mat4 clip, inverse;
     memset(cull, 0, sizeof *cull);
@@ -305,9 +305,9 @@ static void set_radiance(struct light *light)
         float mean = 0.5f * (cosf(glm_rad(s->inner_cone_deg)) + cosf(glm_rad(s->outer_cone_deg)));
         value = s->power_w / (2 * GLM_PIf * fmaxf(1 - mean, 1e-4f));
     } else if (s->power_w > 0) {
-        float area = s->type == PEN_LIGHT_RECT ? s->width * s->height
-            : s->type == PEN_LIGHT_DISK        ? GLM_PIf * s->radius * s->radius
-                                               : 4 * GLM_PIf * s->radius * s->radius;
+        float area = s->type == PEN_LIGHT_RECT   ? s->width * s->height
+                     : s->type == PEN_LIGHT_DISK ? GLM_PIf * s->radius * s->radius
+                                                 : 4 * GLM_PIf * s->radius * s->radius;
         value = s->power_w / (GLM_PIf * area);
     }
     for (int i = 0; i < 3; i++)
@@ -331,7 +331,8 @@ static void make_cube(struct light *light, const struct scene *scene)
     }
 }
 
-static void make_light(struct light *light, const struct pen_light *source, const struct scene *scene)
+static void make_light(
+    struct light *light, const struct pen_light *source, const struct scene *scene)
 {
     memset(light, 0, sizeof *light);
     light->source = source;

@@ -31,7 +31,7 @@ struct light {
     uint32_t face_count;
     float casters[2][3]; /* world bounds of what can cast a shadow in this light */
     /* For shading, world space: */
-    float radiance[3];  /* emitted; point, spot: intensity, W sr^-1; sun: irradiance */
+    float radiance[3]; /* emitted; point, spot: intensity, W sr^-1; sun: irradiance */
     float origin[3], x[3], y[3], z[3];
 };
 

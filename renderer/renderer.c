@@ -2,6 +2,7 @@
 #include "renderer/frame.h"
 #include "renderer/generate/generate.h"
 #include "renderer/gl/context.h"
+#include "renderer/passes/scratch.h"
 #include "renderer/passes/shadow_cache.h"
 #include <stdlib.h>
 #include <string.h>
@@ -16,12 +17,14 @@ const struct technique *const technique_registry[] = {
     NULL};
 
 #define TECHNIQUE(name) +1
-enum { TECHNIQUE_COUNT = 0
+enum {
+    TECHNIQUE_COUNT = 0
 #include "renderer/techniques/registry.def"
 };
 #undef TECHNIQUE
 
 #define MAX_RESIDENT 256
+#define EMISSION_BYTES (64u << 20) /* kept emission textures; they are cheap to make again */
 
 const char *const pen_device_choice_names[] = {"auto", "gpu", "surfaceless", "osmesa", NULL};
 
@@ -33,6 +36,7 @@ struct pen_renderer {
     bool lost;
     struct scene *scenes[MAX_RESIDENT]; /* emission images too: scenes without geometry */
     uint32_t scene_count;
+    struct emission_cache *emissions;
     void *states[TECHNIQUE_COUNT];
 };
 
@@ -62,6 +66,7 @@ struct pen_renderer *pen_renderer_create(
     r->ctx.shadow_budget = r->budget / 2;
     r->ctx.programs = gl_programs_create();
     r->ctx.shadows = shadow_cache_create();
+    r->emissions = emission_cache_create();
     gl_samplers_init(&r->ctx.samplers);
     gl_timer_init(&r->ctx.timer, r->ctx.device.software);
     gl.CreateVertexArrays(1, &r->ctx.empty_array);
@@ -96,6 +101,7 @@ void pen_renderer_destroy(struct pen_renderer *r)
         scene_destroy(r->scenes[i]);
     frame_targets_finish(&r->targets);
     shadow_cache_destroy(r->ctx.shadows);
+    emission_cache_destroy(r->emissions);
     gl_timer_finish(&r->ctx.timer);
     gl_samplers_finish(&r->ctx.samplers);
     gl_programs_destroy(r->ctx.programs);
@@ -105,6 +111,7 @@ void pen_renderer_destroy(struct pen_renderer *r)
     gl_texture_destroy(&r->ctx.interleaved);
     gl_texture_destroy(&r->ctx.sample_scratch);
     gl_texture_destroy(&r->ctx.sum);
+    pass_scratch_finish(&r->ctx);
     gl.DeleteFramebuffers(1, &r->ctx.sum_framebuffer);
     gl.DeleteFramebuffers(1, &r->ctx.interleaved_framebuffer);
     GLuint buffers[] = {r->ctx.light_block, r->ctx.param_block};
@@ -137,12 +144,13 @@ static uint64_t scene_bytes(const struct pen_renderer *r)
 
 uint64_t pen_renderer_gpu_bytes(const struct pen_renderer *r)
 {
-    return scene_bytes(r) + shadow_cache_bytes(r->ctx.shadows);
+    return scene_bytes(r) + shadow_cache_bytes(r->ctx.shadows) + emission_cache_bytes(r->emissions);
 }
 
 static void remove_scene(struct pen_renderer *r, uint32_t i)
 {
     shadow_cache_drop_scene(r->ctx.shadows, r->scenes[i]);
+    emission_cache_drop(r->emissions, r->scenes[i]->id);
     scene_destroy(r->scenes[i]);
     r->scenes[i] = r->scenes[--r->scene_count];
 }
@@ -217,13 +225,13 @@ bool pen_renderer_has_image(const struct pen_renderer *r, const uint8_t id[PEN_I
     return pen_renderer_has_scene(r, id);
 }
 
-static const struct gl_texture *find_image(void *owner, const struct pen_light *light)
+static const struct scene *find_image(void *owner, const struct pen_light *light)
 {
     struct pen_renderer *r = owner;
-    if (light->texture != PEN_TEXTURE_IMAGE)
-        return NULL;
     struct scene *scene = find_scene(r, light->image);
-    return scene && scene->blob.image_count ? &scene->images[0] : NULL;
+    if (scene)
+        scene->last_use = ++r->clock;
+    return scene;
 }
 
 bool pen_renderer_render(struct pen_renderer *r, const struct pen_request *request,
@@ -250,10 +258,12 @@ bool pen_renderer_render(struct pen_renderer *r, const struct pen_request *reque
         .request = &result->completed,
         .technique = technique_registry[t],
         .technique_state = r->states[t],
+        .emissions = r->emissions,
         .find_image = find_image,
         .owner = r};
     bool ok = frame_render(&job, frame, result, error);
     evict(r, scene);
+    emission_cache_trim(r->emissions, EMISSION_BYTES);
     result->gpu_bytes = pen_renderer_gpu_bytes(r);
     GLenum gl_error = gl.GetError();
     if (ok && gl_error == GL_NO_ERROR)
@@ -295,6 +305,12 @@ static void warm_scene(struct pen_renderer *r, uint32_t kind)
             memset(request.technique_params, 0, sizeof request.technique_params);
             pen_params_default(catalogue->items[i]->params, request.technique_params);
             request.width = 64, request.height = 48;
+            /* Programs do not depend on the number of light samples; the time does. */
+            const struct pen_param *samples =
+                pen_param_find(catalogue->items[i]->params, "samples");
+            double few = 16;
+            if (samples && samples->min <= few && samples->max >= few)
+                pen_param_store(samples, request.technique_params, &few, "", NULL);
             if (pen_renderer_render(r, &request, &frame, &result, NULL))
                 pen_frame_finish(&frame);
         }

@@ -7,14 +7,19 @@
 
 struct pen_renderer;
 
-enum pen_device_choice { PEN_DEVICE_AUTO, PEN_DEVICE_GPU, PEN_DEVICE_SURFACELESS, PEN_DEVICE_OSMESA };
+enum pen_device_choice {
+    PEN_DEVICE_AUTO,
+    PEN_DEVICE_GPU,
+    PEN_DEVICE_SURFACELESS,
+    PEN_DEVICE_OSMESA
+};
 extern const char *const pen_device_choice_names[]; /* "auto", "gpu", "surfaceless", "osmesa" */
 
 struct pen_renderer_config {
-    uint32_t device;       /* enum pen_device_choice */
-    uint32_t device_index; /* which EGL device, counting GPUs from 0 */
-    bool require_gpu;      /* fail rather than run in software */
-    bool debug;            /* GL debug output to stderr */
+    uint32_t device;           /* enum pen_device_choice */
+    uint32_t device_index;     /* which EGL device, counting GPUs from 0 */
+    bool require_gpu;          /* fail rather than run in software */
+    bool debug;                /* GL debug output to stderr */
     uint64_t gpu_memory_bytes; /* budget for scenes, images and shadow inputs; 0: 1 GiB */
 };
 

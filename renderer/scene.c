@@ -13,10 +13,10 @@ struct instance_record {
 /* std430 mirror of struct psc_material for the shader. */
 struct material_record {
     float base_color[4];
-    float emissive[4];  /* w: alpha cutoff */
-    float surface[4];   /* metallic, roughness, occlusion strength, normal scale */
-    float specular[4];  /* specular-glossiness: F0 factor, glossiness */
-    uint32_t flags[4];  /* alpha mode, psc flags, mask of textures present, uv sets (1 bit each) */
+    float emissive[4]; /* w: alpha cutoff */
+    float surface[4];  /* metallic, roughness, occlusion strength, normal scale */
+    float specular[4]; /* specular-glossiness: F0 factor, glossiness */
+    uint32_t flags[4]; /* alpha mode, psc flags, mask of textures present, uv sets (1 bit each) */
     float transforms[5][8]; /* rows of the 2x3, padded */
 };
 
@@ -70,7 +70,8 @@ static void upload_materials(struct scene *s)
             memcpy(r->transforms[k] + 4, ref->transform + 3, 12);
         }
         s->has_emission |= m->emissive[0] + m->emissive[1] + m->emissive[2] > 0;
-        bool gloss = m->flags & PSC_SPECULAR_GLOSSINESS ? m->glossiness > 0.5f : m->roughness < 0.5f;
+        bool gloss =
+            m->flags & PSC_SPECULAR_GLOSSINESS ? m->glossiness > 0.5f : m->roughness < 0.5f;
         s->has_gloss |= gloss || m->surface.texture >= 0;
         s->has_unlit |= (m->flags & PSC_UNLIT) != 0;
     }
@@ -106,8 +107,8 @@ static void upload_images(struct scene *s)
         for (uint32_t l = 0; l < image->levels; l++) {
             uint32_t w = image->width >> l ? image->width >> l : 1;
             uint32_t h = image->height >> l ? image->height >> l : 1;
-            gl.TextureSubImage2D(s->images[i].name, (GLint)l, 0, 0, (GLsizei)w, (GLsizei)h,
-                GL_RGBA, GL_UNSIGNED_BYTE, texels);
+            gl.TextureSubImage2D(s->images[i].name, (GLint)l, 0, 0, (GLsizei)w, (GLsizei)h, GL_RGBA,
+                GL_UNSIGNED_BYTE, texels);
             texels += (size_t)4 * w * h;
         }
         s->bytes += s->images[i].bytes;
@@ -116,9 +117,9 @@ static void upload_images(struct scene *s)
     for (uint32_t i = 0; i < s->blob.texture_count; i++) {
         const struct psc_texture *t = &s->blob.textures[i];
         bool near_min = t->nearest & 2, near_mip = t->nearest & 4, no_mips = t->nearest & 8;
-        GLint min = no_mips ? (near_min ? GL_NEAREST : GL_LINEAR)
-            : near_mip ? (near_min ? GL_NEAREST_MIPMAP_NEAREST : GL_LINEAR_MIPMAP_NEAREST)
-                       : (near_min ? GL_NEAREST_MIPMAP_LINEAR : GL_LINEAR_MIPMAP_LINEAR);
+        GLint min = no_mips    ? (near_min ? GL_NEAREST : GL_LINEAR)
+                    : near_mip ? (near_min ? GL_NEAREST_MIPMAP_NEAREST : GL_LINEAR_MIPMAP_NEAREST)
+                               : (near_min ? GL_NEAREST_MIPMAP_LINEAR : GL_LINEAR_MIPMAP_LINEAR);
         gl.CreateSamplers(1, &s->samplers[i]);
         gl.SamplerParameteri(s->samplers[i], GL_TEXTURE_MIN_FILTER, min);
         gl.SamplerParameteri(
@@ -170,10 +171,10 @@ static uint64_t state_key(const struct scene *s, uint32_t instance)
     const struct psc_material *m = material_of(s, instance);
     bool alpha = m->alpha_mode != PSC_OPAQUE;
     uint64_t textured = has_textures(m) || alpha
-        ? 1 + s->blob.primitives[s->blob.instances[instance].primitive].material
-        : 0;
+                            ? 1 + s->blob.primitives[s->blob.instances[instance].primitive].material
+                            : 0;
     return (uint64_t)alpha << 40 | (uint64_t)((m->flags & PSC_DOUBLE_SIDED) != 0) << 39 |
-        (uint64_t)(s->blob.instances[instance].flags & PSC_MIRRORED) << 38 | textured;
+           (uint64_t)(s->blob.instances[instance].flags & PSC_MIRRORED) << 38 | textured;
 }
 
 struct sortable {
@@ -318,8 +319,8 @@ void scene_center(const struct scene *s, float center[3])
 {
     for (int i = 0; i < 3; i++)
         center[i] = scene_is_empty(s)
-            ? 0
-            : 0.5f * (s->blob.header->bounds_min[i] + s->blob.header->bounds_max[i]);
+                        ? 0
+                        : 0.5f * (s->blob.header->bounds_min[i] + s->blob.header->bounds_max[i]);
 }
 
 static void bind_material(struct scene *s, uint32_t material)
@@ -349,15 +350,15 @@ uint64_t scene_draw(struct scene *s, const struct cull_view *view, const struct 
         for (uint32_t i = 0; i < s->groups[g].count; i++) {
             uint32_t instance = s->order[s->groups[g].first + i];
             if (!pass->hidden || !pass->hidden[instance])
-                triangles += cull_instance(view, &s->blob, instance, s->groups[g].double_sided,
-                    s->command_room, &total);
+                triangles += cull_instance(
+                    view, &s->blob, instance, s->groups[g].double_sided, s->command_room, &total);
         }
         runs[g].count = total - runs[g].first;
     }
     if (!total)
         goto done;
-    gl.NamedBufferData(s->commands, (GLsizeiptr)(total * sizeof *s->command_room),
-        s->command_room, GL_STREAM_DRAW);
+    gl.NamedBufferData(s->commands, (GLsizeiptr)(total * sizeof *s->command_room), s->command_room,
+        GL_STREAM_DRAW);
     gl.BindBuffer(GL_DRAW_INDIRECT_BUFFER, s->commands);
     gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, s->materials);
     for (uint32_t g = 0; g < s->group_count; g++) {

@@ -35,8 +35,8 @@ struct scene {
 /* Uploads the blob behind `fd`. Errors as psc_open; PEN_INTERNAL out of GPU memory. */
 struct scene *scene_create(const uint8_t id[PEN_ID_BYTES], int fd, struct pen_error *error);
 /* From memory that outlives the scene. */
-struct scene *scene_create_memory(const uint8_t id[PEN_ID_BYTES], const void *data, size_t bytes,
-    struct pen_error *error);
+struct scene *scene_create_memory(
+    const uint8_t id[PEN_ID_BYTES], const void *data, size_t bytes, struct pen_error *error);
 void scene_destroy(struct scene *scene);
 
 bool scene_is_empty(const struct scene *scene);
@@ -49,11 +49,17 @@ struct scene_pass {
     GLuint opaque, textured;
     bool full; /* draws with all attributes and textures; else positions only where it can */
     bool front_is_clockwise; /* the target's y axis is flipped */
-    const bool *hidden; /* instances to leave out, or NULL */
+    const bool *hidden;      /* instances to leave out, or NULL */
 };
 /* Returns the triangles drawn. The caller has bound framebuffer, viewport and depth state. */
 uint64_t scene_draw(
     struct scene *scene, const struct cull_view *view, const struct scene_pass *pass);
 
 /* Texture units of the geometry passes. */
-enum { SCENE_UNIT_BASE, SCENE_UNIT_SURFACE, SCENE_UNIT_NORMAL, SCENE_UNIT_OCCLUSION, SCENE_UNIT_EMISSION };
+enum {
+    SCENE_UNIT_BASE,
+    SCENE_UNIT_SURFACE,
+    SCENE_UNIT_NORMAL,
+    SCENE_UNIT_OCCLUSION,
+    SCENE_UNIT_EMISSION
+};

@@ -22,22 +22,23 @@ struct technique_ctx {
     struct gl_timer timer;
     struct shadow_cache *shadows;
     struct pen_device_info device;
-    GLuint empty_array;   /* vertex array for passes that make their own vertices */
+    GLuint empty_array;              /* vertex array for passes that make their own vertices */
     GLuint light_block, param_block; /* uniform buffers, GL_UBO_LIGHT and GL_UBO_PARAMS */
-    struct gl_texture white; /* 1 x 1, bound where a light has no emission texture */
-    struct gl_texture tiles; /* of passes/classify.c */
+    struct gl_texture white;         /* 1 x 1, bound where a light has no emission texture */
+    struct gl_texture tiles;         /* of passes/classify.c */
     GLuint tiles_framebuffer;
     struct gl_texture interleaved; /* scratch of passes/interleave.c */
     GLuint interleaved_framebuffer;
     struct gl_texture sample_scratch; /* of passes/sample_maps.c */
     struct gl_texture sum;            /* RGBA32F accumulator of methods that add passes */
     GLuint sum_framebuffer;
-    uint64_t shadow_budget; /* bytes that one method's kept inputs should stay under */
+    struct gl_texture scratch[12]; /* of passes/scratch.c */
+    uint64_t shadow_budget;        /* bytes that one method's kept inputs should stay under */
 };
 
 struct gbuffer {
     struct gl_texture depth;    /* D32F, reversed, 0: background */
-    struct gl_texture normal;   /* RGBA16F: octahedral geometric normal, octahedral shading normal */
+    struct gl_texture normal;   /* RGBA16: octahedral geometric normal, octahedral shading normal */
     struct gl_texture albedo;   /* RGBA8: square root of albedo, flags */
     struct gl_texture surface;  /* RGBA8: roughness, metallic, occlusion, specular scale */
     struct gl_texture emission; /* R11G11B10F; only when the scene has any */
@@ -54,12 +55,13 @@ struct technique_run {
     const struct light_face *face;
     const struct pen_request *request;
     const struct technique *technique;
-    const void *params;      /* the method's own struct, also bound as GL_UBO_PARAMS */
-    void *state;             /* state_size bytes, zeroed when the renderer starts */
-    GLuint vis_framebuffer;  /* bound; pixels already 1; only this face's receivers may be written */
+    const void *params;     /* the method's own struct, also bound as GL_UBO_PARAMS */
+    void *state;            /* state_size bytes, zeroed when the renderer starts */
+    GLuint vis_framebuffer; /* bound; pixels already 1; only this face's receivers may be written */
     const struct gl_texture *emission; /* of the light, with mips, or ctx->white */
     struct pen_result *result;         /* warnings and counts */
     uint32_t width, height;            /* px of vis and G-buffer */
+    uint32_t frame;                    /* number of the jittered frame */
 };
 
 struct technique {
@@ -67,6 +69,8 @@ struct technique {
     size_t state_size;
     bool (*create)(struct technique_ctx *, void *state, struct pen_error *); /* optional */
     bool (*record)(struct technique_run *, struct pen_error *);
+    /* Optional: all frames of an image are recorded (or failed); counts go into the result. */
+    void (*finish)(struct technique_ctx *, void *state, struct pen_result *);
     void (*destroy)(struct technique_ctx *, void *state); /* optional */
 };
 
@@ -74,14 +78,14 @@ extern const struct technique *const technique_registry[]; /* NULL-terminated */
 
 /* Texture units of screen passes. */
 enum {
-    UNIT_DEPTH,     /* gbuffer.depth */
-    UNIT_NORMAL,    /* gbuffer.normal */
+    UNIT_DEPTH,  /* gbuffer.depth */
+    UNIT_NORMAL, /* gbuffer.normal */
     UNIT_ALBEDO,
     UNIT_SURFACE,
-    UNIT_EMITTED,   /* gbuffer.emission */
-    UNIT_EMISSION,  /* emission texture of the light */
-    UNIT_SHADOW,    /* the method's depth map, nearest, border 1 */
-    UNIT_FREE,      /* first of seven units that are the method's own */
+    UNIT_EMITTED,      /* gbuffer.emission */
+    UNIT_EMISSION,     /* emission texture of the light */
+    UNIT_SHADOW,       /* the method's depth map, nearest, border 1 */
+    UNIT_FREE,         /* first of seven units that are the method's own */
     UNIT_MIN_MAX = 14, /* what min_max.glsl reads */
     UNIT_TILES = 15    /* what tiles.vert reads */
 };

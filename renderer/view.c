@@ -32,7 +32,8 @@ static float framing_distance(const struct scene *scene, const float center[3],
         float d[3];
         for (int k = 0; k < 3; k++)
             d[k] = (i >> k & 1 ? scene->blob.header->bounds_max[k]
-                               : scene->blob.header->bounds_min[k]) - center[k];
+                               : scene->blob.header->bounds_min[k]) -
+                   center[k];
         float toward = glm_vec3_dot(d, (float *)direction);
         least = fmaxf(least, toward + fabsf(glm_vec3_dot(d, right)) / tan_x);
         least = fmaxf(least, toward + fabsf(glm_vec3_dot(d, up)) / tan_y);
@@ -48,8 +49,8 @@ static void frame_bounds(struct pen_camera *c, const struct scene *scene, float 
     float direction[3] = {
         sinf(azimuth) * cosf(elevation), sinf(elevation), cosf(azimuth) * cosf(elevation)};
     if (distance <= 0 && !scene_is_empty(scene))
-        distance = 1.06f *
-            framing_distance(scene, center, direction, glm_rad(c->fov_y_deg), aspect);
+        distance =
+            1.06f * framing_distance(scene, center, direction, glm_rad(c->fov_y_deg), aspect);
     if (distance <= 0)
         distance = 3 * scene_radius(scene);
     for (int i = 0; i < 3; i++) {

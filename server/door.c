@@ -177,9 +177,10 @@ static bool is_too_slow(const struct door *door, const struct entry *entry, uint
     }
 }
 
-static void reap(struct door *door, uint64_t now)
+static void reap(struct door *door)
 {
     pthread_mutex_lock(&door->lock);
+    uint64_t now = clock_now_ns(); /* under the lock: never before an entry's time */
     for (int fd = 0; fd < door->capacity; fd++) {
         struct entry *entry = &door->entries[fd];
         if (!entry->used || entry->shut || !is_too_slow(door, entry, now))
@@ -232,7 +233,7 @@ static void *run(void *argument)
             accept_all(door);
         uint64_t now = clock_now_ns();
         if (now - last_reap > TICK_MS * CLOCK_MS) {
-            reap(door, now);
+            reap(door);
             last_reap = now;
         }
         for (uint32_t i = lingering; i-- > 0;) {

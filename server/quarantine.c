@@ -51,8 +51,8 @@ static struct suspect *find(struct quarantine *q, const uint8_t scene[PEN_ID_BYT
 
 bool quarantine_blame(struct quarantine *q, const uint8_t scene[PEN_ID_BYTES])
 {
-    uint64_t now = clock_now_ns();
     pthread_mutex_lock(&q->lock);
+    uint64_t now = clock_now_ns(); /* under the lock: never before an entry's time */
     struct suspect *s = find(q, scene, now);
     for (int i = 0; !s && i < ROOM; i++)
         if (!q->suspects[i].kills)
@@ -73,8 +73,8 @@ bool quarantine_blame(struct quarantine *q, const uint8_t scene[PEN_ID_BYTES])
 
 uint32_t quarantine_remaining_s(struct quarantine *q, const uint8_t scene[PEN_ID_BYTES])
 {
-    uint64_t now = clock_now_ns();
     pthread_mutex_lock(&q->lock);
+    uint64_t now = clock_now_ns(); /* under the lock: never before an entry's time */
     const struct suspect *s = find(q, scene, now);
     uint64_t left = s && s->kills >= KILLS ? q->duration_ns - (now - s->last_ns) : 0;
     pthread_mutex_unlock(&q->lock);
@@ -83,9 +83,9 @@ uint32_t quarantine_remaining_s(struct quarantine *q, const uint8_t scene[PEN_ID
 
 uint32_t quarantine_count(struct quarantine *q)
 {
-    uint64_t now = clock_now_ns();
     uint32_t count = 0;
     pthread_mutex_lock(&q->lock);
+    uint64_t now = clock_now_ns();
     for (int i = 0; i < ROOM; i++)
         count += q->suspects[i].kills >= KILLS && now - q->suspects[i].last_ns < q->duration_ns;
     pthread_mutex_unlock(&q->lock);

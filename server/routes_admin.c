@@ -47,8 +47,8 @@ static void readyz(struct http_exchange *x, struct service *s)
         answer_text(x, 503, obstacle);
         return;
     }
-    uint64_t now = clock_now_ns();
     pthread_mutex_lock(&s->canary_lock);
+    uint64_t now = clock_now_ns();
     bool recent = s->canary_ns && now - s->canary_ns < s->config->canary_interval_ms * CLOCK_MS;
     bool failed = s->canary_failed;
     pthread_mutex_unlock(&s->canary_lock);

@@ -20,6 +20,7 @@
 #define MAX_ATTEMPTS 6 /* of one render, when somebody else ends the workers */
 #define QUIT_MS 3000
 #define MAX_BACKOFF_MS 5000
+#define START_PATIENCE_NS (120 * CLOCK_S)
 #define MAX_DROPS 64
 
 enum phase { PHASE_SENT, PHASE_RENDERING, PHASE_ENCODING };
@@ -37,6 +38,7 @@ struct slot {
     uint32_t index;
     uint8_t drops[MAX_DROPS][PEN_ID_BYTES]; /* guarded by pool->lock */
     uint32_t drop_count;                    /* guarded by pool->lock */
+    struct channel_resident resident;       /* guarded by pool->lock */
     /* Only the slot's thread: */
     struct process process;
     int socket;
@@ -49,7 +51,7 @@ struct slot {
 struct worker_pool {
     struct worker_pool_config config;
     struct quarantine *quarantine;
-    pthread_mutex_t lock; /* guards numbers, and the drops of the slots */
+    pthread_mutex_t lock; /* guards numbers, and the drops and residents of the slots */
     struct worker_pool_numbers numbers;
     bool stopping; /* atomic */
     struct slot slots[16];
@@ -166,6 +168,9 @@ static void bury(struct slot *slot)
         pool->numbers.pids[slot->index] = 0;
         pthread_mutex_unlock(&pool->lock);
     }
+    pthread_mutex_lock(&pool->lock);
+    slot->resident.count = 0;
+    pthread_mutex_unlock(&pool->lock);
     slot->failures = slot->said_hello ? 0 : slot->failures + 1;
     slot->is_replacement = true;
     for (int i = 0; i < IN_FLIGHT; i++) {
@@ -279,6 +284,13 @@ static bool on_message(
             flight->since_ns = clock_now_ns();
         }
         return true;
+    case CHANNEL_RESIDENT:
+        pthread_mutex_lock(&slot->pool->lock);
+        slot->resident = message->resident;
+        if (slot->resident.count > CHANNEL_MAX_RESIDENT)
+            slot->resident.count = 0;
+        pthread_mutex_unlock(&slot->pool->lock);
+        return true;
     case CHANNEL_DONE:
         on_done(slot, message, fds);
         return true;
@@ -358,11 +370,14 @@ static bool feed(struct slot *slot)
 static bool is_hung(const struct slot *slot, uint64_t now)
 {
     uint64_t patience = slot->pool->config.hang_timeout_ms * CLOCK_MS;
+    /* A start and a warm-up take their time, whatever is asked of renders. */
+    uint64_t start = patience > START_PATIENCE_NS ? patience : START_PATIENCE_NS;
     if (!slot->said_hello)
-        return now - slot->spawned_ns > patience;
+        return now - slot->spawned_ns > start;
     for (int i = 0; i < IN_FLIGHT; i++) {
         const struct flight *flight = &slot->flights[i];
-        if (flight->render && now - flight->since_ns > patience &&
+        uint64_t limit = flight->phase == PHASE_SENT ? start : patience;
+        if (flight->render && now - flight->since_ns > limit &&
             now > flight->render->last_deadline_ns)
             return true;
     }
@@ -483,6 +498,17 @@ void worker_pool_drop_scene(struct worker_pool *pool, const uint8_t scene[PEN_ID
 uint32_t worker_pool_quarantine_s(struct worker_pool *pool, const uint8_t scene[PEN_ID_BYTES])
 {
     return quarantine_remaining_s(pool->quarantine, scene);
+}
+
+bool worker_pool_is_resident(struct worker_pool *pool, const uint8_t scene[PEN_ID_BYTES])
+{
+    bool found = false;
+    pthread_mutex_lock(&pool->lock);
+    for (uint32_t i = 0; i < pool->config.workers; i++)
+        for (uint32_t k = 0; k < pool->slots[i].resident.count; k++)
+            found = found || !memcmp(pool->slots[i].resident.scenes[k], scene, PEN_ID_BYTES);
+    pthread_mutex_unlock(&pool->lock);
+    return found;
 }
 
 void worker_pool_read(struct worker_pool *pool, struct worker_pool_numbers *numbers)

@@ -95,8 +95,8 @@ static bool make_egl_context(struct gl_context *c, bool debug, struct pen_error 
         return pen_fail(error, PEN_UNAVAILABLE, "", "EGL could not open the display.");
     }
     const char *extensions = c->QueryString(c->display, EGL_EXTENSIONS);
-    bool robust = has_word(extensions, "EGL_EXT_create_context_robustness") ||
-        (major == 1 && minor >= 5);
+    bool robust =
+        has_word(extensions, "EGL_EXT_create_context_robustness") || (major == 1 && minor >= 5);
     /* Surfaceless displays offer no configs at all, so a config-less context it is. */
     EGLint attributes[] = {EGL_CONTEXT_MAJOR_VERSION, 4, EGL_CONTEXT_MINOR_VERSION, 5,
         EGL_CONTEXT_OPENGL_PROFILE_MASK, EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT,
@@ -116,7 +116,8 @@ static bool make_egl_context(struct gl_context *c, bool debug, struct pen_error 
     }
     if (c->context == EGL_NO_CONTEXT ||
         !c->MakeCurrent(c->display, EGL_NO_SURFACE, EGL_NO_SURFACE, c->context))
-        return pen_fail(error, PEN_UNAVAILABLE, "", "No OpenGL 4.5 core context without a surface.");
+        return pen_fail(
+            error, PEN_UNAVAILABLE, "", "No OpenGL 4.5 core context without a surface.");
     return load_gl((load_function)c->GetProcAddress, error);
 }
 

@@ -107,7 +107,8 @@ static void append_params(struct text *t, const struct pen_technique_info *info,
         append(t, "layout(std140, binding = 2) uniform ParamBlock {\n");
         static const char *const types[] = {"float", "int", "uint", "uint"};
         for (uint32_t i = 0; i < info->params.count; i++)
-            appendf(t, "    %s p_%s;\n", types[info->params.rows[i].type], info->params.rows[i].name);
+            appendf(
+                t, "    %s p_%s;\n", types[info->params.rows[i].type], info->params.rows[i].name);
         append(t, "} param_block;\n");
     }
     for (uint32_t i = 0; i < info->params.count; i++) {
@@ -225,8 +226,7 @@ GLuint gl_programs_get(
     }
     if (programs->count == programs->room) {
         programs->room = programs->room ? 2 * programs->room : 32;
-        programs->entries =
-            realloc(programs->entries, programs->room * sizeof *programs->entries);
+        programs->entries = realloc(programs->entries, programs->room * sizeof *programs->entries);
         if (!programs->entries)
             abort();
     }

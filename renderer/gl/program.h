@@ -5,8 +5,8 @@
 
 struct gl_programs;
 
-/* What a program is made of: `#version`, `defines`, the parameter block of `info` (when given), then
- * the named files, in which a line `#include "name"` is replaced once by that file. */
+/* What a program is made of: `#version`, `defines`, the parameter block of `info` (when given),
+ * then the named files, in which a line `#include "name"` is replaced once by that file. */
 struct gl_program_desc {
     const char *vertex, *fragment, *compute; /* file names in gl_sources; NULL: no such stage */
     const char *body;    /* replaces `#include "BODY"` in the files: a technique's own file */

@@ -44,8 +44,8 @@ struct gl_texture gl_texture_create(
         gl.TextureStorage3D(t.name, n, format, w, h, (GLsizei)layers);
     else
         gl.TextureStorage2D(t.name, n, format, w, h);
-    gl.TextureParameteri(t.name, GL_TEXTURE_MIN_FILTER,
-        t.levels > 1 ? GL_NEAREST_MIPMAP_NEAREST : GL_NEAREST);
+    gl.TextureParameteri(
+        t.name, GL_TEXTURE_MIN_FILTER, t.levels > 1 ? GL_NEAREST_MIPMAP_NEAREST : GL_NEAREST);
     gl.TextureParameteri(t.name, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
     gl.TextureParameteri(t.name, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
     gl.TextureParameteri(t.name, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);

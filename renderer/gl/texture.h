@@ -20,17 +20,18 @@ void gl_texture_destroy(struct gl_texture *texture);
 bool gl_texture_fit(struct gl_texture *texture, GLenum format, uint32_t width, uint32_t height,
     uint32_t layers, uint32_t levels);
 
-/* A framebuffer with these colour attachments (level 0, or one layer of an array when layer >= 0). */
-GLuint gl_framebuffer_create(const struct gl_texture *const *colors, uint32_t count,
-    const struct gl_texture *depth);
+/* A framebuffer with these colour attachments (level 0, or one layer of an array when layer >= 0).
+ */
+GLuint gl_framebuffer_create(
+    const struct gl_texture *const *colors, uint32_t count, const struct gl_texture *depth);
 
 enum gl_sampler_kind {
-    GL_SAMPLE_NEAREST,        /* clamp */
-    GL_SAMPLE_LINEAR,         /* clamp, no mips */
-    GL_SAMPLE_TRILINEAR,      /* clamp, mips */
-    GL_SAMPLE_NEAREST_BORDER, /* border 1: outside a depth map nothing occludes */
-    GL_SAMPLE_COMPARE_NEAREST,/* <=, border 1 */
-    GL_SAMPLE_COMPARE_LINEAR, /* <=, border 1 */
+    GL_SAMPLE_NEAREST,         /* clamp */
+    GL_SAMPLE_LINEAR,          /* clamp, no mips */
+    GL_SAMPLE_TRILINEAR,       /* clamp, mips */
+    GL_SAMPLE_NEAREST_BORDER,  /* border 1: outside a depth map nothing occludes */
+    GL_SAMPLE_COMPARE_NEAREST, /* <=, border 1 */
+    GL_SAMPLE_COMPARE_LINEAR,  /* <=, border 1 */
     GL_SAMPLER_KINDS
 };
 struct gl_samplers {

@@ -5,7 +5,7 @@
 
 #define IMP_MAX_JSON_BYTES (512u << 20) /* data URIs count */
 #define IMP_MAX_JSON_DEPTH 64
-#define IMP_MAX_JSON_VALUES (6u << 20)
+#define IMP_MAX_JSON_VALUES 10000000u /* about 100 bytes each */
 
 #define IMP_MAX_ZIP_BYTES (1ull << 30)       /* unpacked, all entries together */
 #define IMP_MAX_ZIP_RATIO 200                /* unpacked to packed, of a zip that unpacks to ... */

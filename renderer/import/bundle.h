@@ -3,7 +3,7 @@
  * entries are sorted by name, so that the order of upload does not matter.
  *
  *   char magic[8] = "PENBNDL1"; uint32_t count; uint32_t reserved = 0;
- *   count x { uint32_t name_bytes; uint32_t reserved; uint64_t data_bytes; name; data }   (unpadded)
+ *   count x { uint32_t name_bytes; uint32_t reserved; uint64_t data_bytes; name; data } (unpadded)
  *
  * Names are relative, '/'-separated, without "." or ".." parts, at most 255 bytes, unique. */
 #pragma once

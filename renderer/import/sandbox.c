@@ -31,12 +31,12 @@ struct landlock_rules {
 #define SYS_landlock_restrict_self 446
 #endif
 
-static void enter_landlock(void)
+bool pen_sandbox_enter_landlock(void)
 {
     long version = syscall(SYS_landlock_create_ruleset, NULL, 0, LANDLOCK_VERSION_FLAG);
     if (version < 1) {
         fprintf(stderr, "penumbra-import: this kernel has no Landlock; going on without it\n");
-        return;
+        return false;
     }
     /* Every file system right that the version knows: 13, then REFER, TRUNCATE and IOCTL_DEV. */
     unsigned rights = version >= 5 ? 16 : version >= 3 ? 15 : version == 2 ? 14 : 13;
@@ -51,10 +51,12 @@ static void enter_landlock(void)
         bytes = 3 * sizeof(uint64_t);
     }
     int fd = (int)syscall(SYS_landlock_create_ruleset, &rules, bytes, 0);
-    if (fd < 0 || syscall(SYS_landlock_restrict_self, fd, 0))
+    bool done = fd >= 0 && !syscall(SYS_landlock_restrict_self, fd, 0);
+    if (!done)
         fprintf(stderr, "penumbra-import: Landlock refused: %s\n", strerror(errno));
     if (fd >= 0)
         close(fd);
+    return done;
 }
 
 static const int allowed[] = {SCMP_SYS(brk), SCMP_SYS(clock_gettime), SCMP_SYS(close),
@@ -120,7 +122,7 @@ bool pen_sandbox_enter(const struct pen_sandbox_limits *limits, struct pen_error
     prctl(PR_SET_DUMPABLE, 0);
     if (prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0))
         fprintf(stderr, "penumbra-import: no_new_privs refused: %s\n", strerror(errno));
-    enter_landlock();
+    pen_sandbox_enter_landlock();
     if (!limit(RLIMIT_CORE, 0, 0, error) || !limit(RLIMIT_CPU, cpu, cpu + 1, error) ||
         !limit(RLIMIT_FSIZE, limits->output_bytes, limits->output_bytes, error) ||
         !limit(RLIMIT_NPROC, 0, 0, error) || !limit(RLIMIT_NOFILE, 0, 0, error) ||

@@ -16,3 +16,6 @@ struct pen_sandbox_limits {
  * system call fails with EPERM. What the kernel lacks is told on stderr and left out. Errors:
  * PEN_INTERNAL, when a resource limit cannot be set. */
 bool pen_sandbox_enter(const struct pen_sandbox_limits *limits, struct pen_error *error);
+
+/* Only the Landlock part, for tests; false when the kernel lacks it. */
+bool pen_sandbox_enter_landlock(void);

@@ -99,6 +99,8 @@ static bool check_value(struct walk *walk, cJSON *value, const struct field *fie
         if (!cJSON_IsObject(value))
             return bad(walk, "must be an object");
         return check_members(walk, value, field);
+    case ANYTHING:
+        return true;
     case OBJECT:
         return check_object(walk, value, field->schema);
     case STRING:
@@ -116,25 +118,23 @@ static bool check_object(struct walk *walk, cJSON *object, const struct schema *
     uint32_t seen = 0;
     for (cJSON *item = object->child, *next; item; item = next) {
         next = item->next;
-        if (!strcmp(item->string, "extras")) {
+        uint32_t i = 0;
+        while (i < schema->count && strcmp(schema->fields[i].key, item->string))
+            i++;
+        if (i == schema->count) {
             cJSON_Delete(cJSON_DetachItemViaPointer(object, item));
             continue;
         }
-        for (uint32_t i = 0; i < schema->count; i++) {
-            const struct field *field = &schema->fields[i];
-            if (strcmp(field->key, item->string))
-                continue;
-            struct step step = {walk->at, field->key, 0};
-            walk->at = &step;
-            /* Two parsers may prefer different ones, and then one of them was never checked. */
-            if (seen >> i & 1)
-                return bad(walk, "stands there twice");
-            seen |= 1u << i;
-            if (!check_value(walk, item, field))
-                return false;
-            walk->at = step.up;
-            break;
-        }
+        const struct field *field = &schema->fields[i];
+        struct step step = {walk->at, field->key, 0};
+        walk->at = &step;
+        /* Two parsers may prefer different ones, and then one of them was never checked. */
+        if (seen >> i & 1)
+            return bad(walk, "stands there twice");
+        seen |= 1u << i;
+        if (!check_value(walk, item, field))
+            return false;
+        walk->at = step.up;
     }
     for (uint32_t i = 0; i < schema->count; i++)
         if (schema->fields[i].required && !(seen >> i & 1)) {

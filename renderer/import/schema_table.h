@@ -27,7 +27,8 @@ enum field_kind {
     STRINGS,
     BOOL,
     OBJECT,
-    OBJECTS, /* an array of OBJECT */
+    OBJECTS,  /* an array of OBJECT */
+    ANYTHING, /* kept as it is */
 };
 
 struct field {

@@ -67,6 +67,11 @@ const struct shadow_input *pass_caster_map(
 bool pass_draw_casters(struct technique_run *run, GLuint framebuffer, uint32_t size,
     const float sample[2], const float rect[4], bool backdrops, struct pen_error *error);
 
+/* Depth peeling, one layer: what of the casters lies behind the 2D depth texture `layer_before` of
+ * the same size, far sides included, seen from the light's centre. */
+bool pass_draw_casters_behind(struct technique_run *run, GLuint framebuffer, uint32_t size,
+    GLuint layer_before, struct pen_error *error);
+
 /* Min and max of linear z (metres from the light's plane; texels where nothing is: 1e30) over 2^k x
  * 2^k texels: RG32F with the whole mip chain in textures[0]; level 0 has half the map's side. */
 const struct shadow_input *pass_min_max(

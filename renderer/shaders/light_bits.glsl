@@ -1,16 +1,36 @@
-// What the pixels see of the light samples of a page: a bit per sample for "lit", one for "dark";
-// neither: below the receiver's horizon, or the filter's texels differ. Light pages are numbered as
-// in passes/light_tree.h; the first has room for two flags.
-layout(binding = 7) uniform sampler2DArray bits_first;  // pages 0 and 1
-layout(binding = 8) uniform sampler2DArray bits_middle; // 2 to 5
-layout(binding = 9) uniform sampler2DArray bits_last;   // 6 to 21
-const uint FLAG = 0x8000u; // in r: something may block the pixel's light
-const uint SAMPLES_OF_FIRST = 0x1ffu;
+// Occlusion bits of the emitter's points (passes/light_bits.h). LIGHT_BITS is 64 or 256; patches
+// that overlap set the same bits, so casters behind one another count once.
+layout(binding = 8) uniform usampler2DArray bits_below; // (step, 2 pattern + axis, 128 bits)
+const int BIT_LAYERS = LIGHT_BITS == 256 ? 2 : 1;
+const float BIT_STEPS = 512.0;
 
-uvec2 page_bits(ivec2 pixel, int page)
+uvec4 hidden_bits[BIT_LAYERS]; // 64: xy
+int bit_pattern;
+
+void bits_begin(int pattern)
 {
-    vec2 v = page < 2 ? texelFetch(bits_first, ivec3(pixel, page), 0).rg
-           : page < 6 ? texelFetch(bits_middle, ivec3(pixel, page - 2), 0).rg
-                      : texelFetch(bits_last, ivec3(pixel, page - 6), 0).rg;
-    return uvec2(v * 65535.0 + 0.5);
+    bit_pattern = pattern;
+    for (int i = 0; i < BIT_LAYERS; i++)
+        hidden_bits[i] = uvec4(0u);
+}
+
+void bits_add(vec2 low, vec2 high)
+{
+    ivec4 at = ivec4(clamp(vec4(low, high) * 0.5 + 0.5, 0.0, 1.0) * BIT_STEPS + 0.5);
+    int row = 2 * bit_pattern;
+    for (int i = 0; i < BIT_LAYERS; i++)
+        hidden_bits[i] |= texelFetch(bits_below, ivec3(at.z, row, i), 0) &
+            ~texelFetch(bits_below, ivec3(at.x, row, i), 0) &
+            texelFetch(bits_below, ivec3(at.w, row + 1, i), 0) &
+            ~texelFetch(bits_below, ivec3(at.y, row + 1, i), 0);
+}
+
+float bits_lit_share()
+{
+    int count = 0;
+    for (int i = 0; i < BIT_LAYERS; i++) {
+        ivec4 n = bitCount(hidden_bits[i]);
+        count += n.x + n.y + n.z + n.w;
+    }
+    return 1.0 - float(count) * (1.0 / float(LIGHT_BITS));
 }

@@ -15,11 +15,10 @@ static bool record(struct technique_run *run, struct pen_error *error)
 {
     const struct hard *params = run->params;
     const struct shadow_input *map = pass_caster_map(run, params->map_size, error);
-    return map &&
-        pass_screen(run,
-            &(struct pass_screen){
-                .name = "hard", .body = "hard.glsl", .shadow = &map->textures[0]},
-            error);
+    return map && pass_screen(run,
+                      &(struct pass_screen){
+                          .name = "hard", .body = "hard.glsl", .shadow = &map->textures[0]},
+                      error);
 }
 
 const struct technique technique_hard = {

@@ -1,3 +1,4 @@
+#include "horizon.glsl"
 layout(binding = 7) uniform sampler2D accumulated;
 
 vec4 visibility(Surface s)
@@ -5,9 +6,8 @@ vec4 visibility(Surface s)
     vec4 sum = texelFetch(accumulated, s.pixel, 0);
     // A textured light's mean visibility is that of its luminance: there is no fifth channel.
 #if P_weighting == 0
-    // a: the share of the light above the horizon. Where little of it is left the mean would rest on
-    // a few samples, and irradiance is next to nothing: there it fades to 0 instead.
-    sum.rgb /= max(sum.a, 0.25);
+    // a: the share of the light above the horizon.
+    sum.rgb /= horizon_weight(sum.a);
 #else
     sum.rgb /= max(sum.a, 1e-20);
 #endif

@@ -263,7 +263,13 @@ static void settle_tile(void *context, uint32_t item)
     sample_receivers(run, lit, lit_count, TRACE_ASSUME_VISIBLE);
 }
 
-/* full = verdict MIXED within `radius` receivers, in x and then in y. */
+/* Lit beside umbra: a contact, or a silhouette whose penumbra is thinner than a receiver. */
+static bool is_edge(uint8_t a, uint8_t b)
+{
+    return (a == LIT && b == UMBRA) || (a == UMBRA && b == LIT);
+}
+
+/* full = a mixed verdict or an edge within `radius` receivers, in x and then in y. */
 static bool dilate(struct run *run)
 {
     uint32_t w = run->job->width, h = run->job->height;
@@ -272,7 +278,9 @@ static bool dilate(struct run *run)
     if (!rows)
         return false;
     for (uint32_t pixel = 0; pixel < w * h; pixel++) {
-        if (run->verdicts[pixel] != MIXED)
+        uint8_t own = run->verdicts[pixel], left = pixel % w ? run->verdicts[pixel - 1] : own;
+        uint8_t above = pixel >= w ? run->verdicts[pixel - w] : own;
+        if (own != MIXED && !is_edge(own, left) && !is_edge(own, above))
             continue;
         uint32_t x = pixel % w, low = x > radius ? x - radius : 0;
         uint32_t high = x + radius < w ? x + radius : w - 1;

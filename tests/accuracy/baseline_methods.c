@@ -43,16 +43,18 @@ static void check_pcss(void)
             "&light.width=0.5&light.height=0.5",
             &shot);
         double expected = 0.8 * 2 * a * c / (h - c), width = harness_width_10_90(&shot);
-        fprintf(stderr, "pcss caster at %.1f: 10-90 %% width %.4f, expected %.4f\n", c, width, expected);
+        fprintf(stderr, "pcss caster at %.1f: 10-90 %% width %.4f, expected %.4f\n", c, width,
+            expected);
         CHECK_NEAR(width, expected, 0.05 * expected);
         CHECK(harness_deviation(&shot, truth_half_plane, &t).rmse < 0.02);
         harness_shot_finish(&shot);
     }
     struct planar_case disk = {.c = 1.2, .h = 3, .a = 0.5};
-    CHECK(deviation(PEN_GENERATED_HALF_PLANE, 1.2f,
-              "technique=pcss&map_size=4096&search_taps=64&filter_taps=64&" HARNESS_VIEW HARNESS_DISK,
-              truth_half_plane_disk, &disk)
-              .rmse < 0.02);
+    CHECK(
+        deviation(PEN_GENERATED_HALF_PLANE, 1.2f,
+            "technique=pcss&map_size=4096&search_taps=64&filter_taps=64&" HARNESS_VIEW HARNESS_DISK,
+            truth_half_plane_disk, &disk)
+            .rmse < 0.02);
 }
 
 static void check_multisample(void)
@@ -67,13 +69,15 @@ static void check_multisample(void)
         char settings[512];
         snprintf(settings, sizeof settings,
             "technique=multisample&samples=%u&map_size=2048&" HARNESS_VIEW HARNESS_RECT, counts[i]);
-        double rmse = deviation(PEN_GENERATED_HALF_PLANE, 1.2f, settings, truth_half_plane, &t).rmse_penumbra;
+        double rmse =
+            deviation(PEN_GENERATED_HALF_PLANE, 1.2f, settings, truth_half_plane, &t).rmse_penumbra;
         CHECK(rmse < limits[i] + 0.002);
         CHECK(rmse < 0.5 * last);
         last = rmse;
     }
     struct deviation square = deviation(PEN_GENERATED_SQUARE, 1.2f,
-        "technique=multisample&samples=256&map_size=2048&" HARNESS_VIEW HARNESS_RECT, truth_square, &t);
+        "technique=multisample&samples=256&map_size=2048&" HARNESS_VIEW HARNESS_RECT, truth_square,
+        &t);
     CHECK(square.rmse < 0.005);
     struct deviation disk = deviation(PEN_GENERATED_HALF_PLANE, 1.2f,
         "technique=multisample&samples=256&map_size=2048&" HARNESS_VIEW HARNESS_DISK,

@@ -14,8 +14,8 @@ static void compare(const uint8_t *id, const char *method, const char *view)
     for (uint32_t i = 0; i < 4 * on.width * on.height; i++)
         worst = fmaxf(worst, fabsf(on.visibility[i] - off.visibility[i]));
     const uint32_t *c = on.result.class_pixels;
-    fprintf(stderr, "%-14s worst %.5f; lit %u, undecided %u, umbra %u\n", method, (double)worst, c[0],
-        c[1], c[2]);
+    fprintf(stderr, "%-14s worst %.5f; lit %u, undecided %u, umbra %u\n", method, (double)worst,
+        c[0], c[1], c[2]);
     CHECK(worst < 1.0f / 255);
     CHECK(off.result.class_pixels[0] == 0 && on.result.full_work_pixels == c[1]);
     harness_shot_finish(&on);
@@ -48,7 +48,8 @@ int main(int argc, char **argv)
     uint8_t demo[PEN_ID_BYTES], half[PEN_ID_BYTES];
     harness_scene(&(struct pen_generated_options){.kind = PEN_GENERATED_DEMO}, demo);
     harness_scene(
-        &(struct pen_generated_options){.kind = PEN_GENERATED_HALF_PLANE, .caster_height = 1.2f}, half);
+        &(struct pen_generated_options){.kind = PEN_GENERATED_HALF_PLANE, .caster_height = 1.2f},
+        half);
     for (uint32_t i = 0; i < catalogue->count; i++) {
         const char *name = catalogue->items[i]->name;
         if ((argc > 1 && strcmp(argv[1], name)) ||
@@ -56,7 +57,8 @@ int main(int argc, char **argv)
             continue;
         compare(demo, name, "width=320&height=240&camera.index=0");
         compare(demo, name,
-            "width=320&height=240&light.type=sun&light.angular_diameter_deg=4&light.position=1,2,1");
+            "width=320&height=240&light.type=sun&light.angular_diameter_deg=4&light.position=1,2,"
+            "1");
         compare(demo, name, "width=320&height=240&light.type=sphere&light.position=1,3,1");
         compare(half, name, HARNESS_VIEW HARNESS_RECT);
         compare(half, name, HARNESS_VIEW HARNESS_DISK);

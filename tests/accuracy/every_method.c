@@ -41,7 +41,8 @@ static void check_finite(const char *method, const uint8_t *id)
     CHECK(harness_not_finite(&shot) == 0);
     for (uint32_t i = 0; i < 4 * shot.width * shot.height; i++)
         if (!(shot.visibility[i] >= -1e-3f && shot.visibility[i] <= 1.001f)) {
-            fprintf(stderr, "%s: visibility %g out of [0, 1]\n", method, (double)shot.visibility[i]);
+            fprintf(
+                stderr, "%s: visibility %g out of [0, 1]\n", method, (double)shot.visibility[i]);
             CHECK(false);
             break;
         }
@@ -63,7 +64,8 @@ int main(int argc, char **argv)
         check_lit_exactly(name, plane, HARNESS_RECT);
         check_lit_exactly(name, plane, HARNESS_DISK);
         check_lit_exactly(name, plane, "&light.type=sun&light.position=1,2,0.5");
-        check_lit_exactly(name, plane, "&light.type=sphere&light.position=0.5,1.5,0&light.radius=0.2");
+        check_lit_exactly(
+            name, plane, "&light.type=sphere&light.position=0.5,1.5,0&light.radius=0.2");
         check_lit_exactly(name, plane, "&light.type=point&light.position=0.5,1.5,0");
         check_lit_exactly(name, plane, "&light.type=spot&light.position=0.5,1.5,0");
         check_lit_exactly(name, room, HARNESS_RECT);

@@ -70,7 +70,8 @@ void harness_shot(const uint8_t id[PEN_ID_BYTES], const char *settings, struct s
     uint32_t count = 0;
     char *text = strdup(settings), *state = NULL;
     memset(shot, 0, sizeof *shot);
-    for (char *at = strtok_r(text, "&", &state); at && count < 62; at = strtok_r(NULL, "&", &state)) {
+    for (char *at = strtok_r(text, "&", &state); at && count < 62;
+         at = strtok_r(NULL, "&", &state)) {
         char *equals = strchr(at, '=');
         *equals = 0;
         pairs[count++] = (struct pen_query_pair){at, equals + 1};
@@ -89,8 +90,8 @@ void harness_shot(const uint8_t id[PEN_ID_BYTES], const char *settings, struct s
     shot->width = frame.width, shot->height = frame.height;
     for (uint32_t i = 0; i < frame.plane_count; i++) {
         float **to = !strcmp(frame.planes[i].name, "visibility") ? &shot->visibility
-            : !strcmp(frame.planes[i].name, "position")          ? &shot->position
-            : !strcmp(frame.planes[i].name, "normal")            ? &shot->normal
+                     : !strcmp(frame.planes[i].name, "position") ? &shot->position
+                     : !strcmp(frame.planes[i].name, "normal")   ? &shot->normal
                                                                  : NULL;
         if (to) {
             *to = frame.planes[i].data;
@@ -168,7 +169,8 @@ double truth_half_plane_disk(double x, double z, const void *planar_case)
 static double hidden(const struct planar_case *t, double r)
 {
     double k = (t->h - t->c) / t->h;
-    double high = fmin(t->a, (t->s - r * k) / (1 - k)), low = fmax(-t->a, (-t->s - r * k) / (1 - k));
+    double high = fmin(t->a, (t->s - r * k) / (1 - k)),
+           low = fmax(-t->a, (-t->s - r * k) / (1 - k));
     return fmax(0, high - low) / (2 * t->a);
 }
 
@@ -186,7 +188,7 @@ static double crossing(const struct shot *shot, float level)
         if ((a < level) != (b < level)) {
             float t = (level - a) / (b - a);
             return shot->position[4 * (i - 1)] +
-                t * (shot->position[4 * i] - shot->position[4 * (i - 1)]);
+                   t * (shot->position[4 * i] - shot->position[4 * (i - 1)]);
         }
     }
     return NAN;

@@ -97,8 +97,9 @@ class Daemon:
         head = {"Content-Type": "application/json"}
         if fresh:
             head["Cache-Control"] = "no-cache"
+        request = {"deadline_ms": int(30000 * SLOW), **(request or {})}
         head.update({k.replace("_", "-"): v for k, v in headers.items()})
-        return self.call("POST", "/v1/scenes/%s/render" % scene, json.dumps(request or {}), head,
+        return self.call("POST", "/v1/scenes/%s/render" % scene, json.dumps(request), head,
                          timeout=timeout)
 
     def metric(self, name, labels=""):
@@ -123,8 +124,8 @@ class Daemon:
 
     def worker(self):
         """The pid of a worker that takes jobs."""
-        wait(lambda: self.metric("penumbra_workers_up") == 1 and self.children("penumbra-worker"))
-        return self.children("penumbra-worker")[0]
+        return wait(lambda: self.metric("penumbra_workers_up") == 1 and
+                    self.children("penumbra-worker"))[0]
 
     def leftovers(self):
         return os.listdir(os.path.join(self.store, "tmp"))

@@ -292,7 +292,7 @@ def shapes():
     nest = b'{"asset":{"version":"2.0"},"x":' + b"[" * 20000 + b"]" * 20000 + b"}"
     yield "deep.glb", struct.pack("<4sIIII", b"glTF", 2, 20 + len(nest), len(nest), 0x4E4F534A) + nest
     yield "materials-million.gltf", gltf(materials=[{}] * 1000000)
-    yield "values-seven-million.gltf", gltf()[:-1] + b', "x": [' + b"0," * 7000000 + b"0]}"
+    yield "values-eleven-million.gltf", gltf()[:-1] + b', "x": [' + b"0," * 11000000 + b"0]}"
 
 
 def binaries():

@@ -7,7 +7,8 @@
 
 struct pen_renderer *fixture_renderer(uint32_t device, uint64_t gpu_memory, struct pen_error *error)
 {
-    struct pen_renderer_config config = {.device = device, .gpu_memory_bytes = gpu_memory, .debug = true};
+    struct pen_renderer_config config = {
+        .device = device, .gpu_memory_bytes = gpu_memory, .debug = true};
     memset(error, 0, sizeof *error);
     return pen_renderer_create(&config, error);
 }
@@ -38,7 +39,8 @@ void fixture_scene(struct pen_renderer *renderer, uint32_t kind, uint32_t triang
     close(fd);
 }
 
-void fixture_request(struct pen_request *request, const uint8_t id[PEN_ID_BYTES], const char *technique)
+void fixture_request(
+    struct pen_request *request, const uint8_t id[PEN_ID_BYTES], const char *technique)
 {
     const struct pen_catalogue *catalogue = pen_renderer_catalogue();
     const struct pen_technique_info *info = pen_catalogue_find(catalogue, technique);
@@ -51,8 +53,8 @@ void fixture_request(struct pen_request *request, const uint8_t id[PEN_ID_BYTES]
     request->width = 200, request->height = 150;
 }
 
-uint64_t fixture_render(struct pen_renderer *renderer, const struct pen_request *request,
-    struct pen_result *result)
+uint64_t fixture_render(
+    struct pen_renderer *renderer, const struct pen_request *request, struct pen_result *result)
 {
     struct pen_error error = {0};
     struct pen_frame frame;

@@ -4,12 +4,14 @@
 #include "renderer/renderer.h"
 
 /* A renderer, or NULL with *error; `device` as enum pen_device_choice. */
-struct pen_renderer *fixture_renderer(uint32_t device, uint64_t gpu_memory, struct pen_error *error);
+struct pen_renderer *fixture_renderer(
+    uint32_t device, uint64_t gpu_memory, struct pen_error *error);
 /* Loads a generated scene under an id made of `kind` and `seed`. Exits on failure. */
 void fixture_scene(struct pen_renderer *renderer, uint32_t kind, uint32_t triangles, uint32_t seed,
     uint8_t id[PEN_ID_BYTES]);
 /* A default request for that scene, 200 x 150. */
-void fixture_request(struct pen_request *request, const uint8_t id[PEN_ID_BYTES], const char *technique);
+void fixture_request(
+    struct pen_request *request, const uint8_t id[PEN_ID_BYTES], const char *technique);
 /* Renders; returns the pixels of the first plane as a hash. Exits on failure. */
-uint64_t fixture_render(struct pen_renderer *renderer, const struct pen_request *request,
-    struct pen_result *result);
+uint64_t fixture_render(
+    struct pen_renderer *renderer, const struct pen_request *request, struct pen_result *result);

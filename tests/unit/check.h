@@ -1,4 +1,5 @@
-/* The few assertions our C tests use. A test is a program: exit 0 passed, 77 skipped, else failed. */
+/* The few assertions our C tests use. A test is a program: exit 0 passed, 77 skipped, else failed.
+ */
 #pragma once
 #include <math.h>
 #include <stdio.h>
@@ -27,8 +28,8 @@ static int check_failures __attribute__((unused));
     do {                                                                                           \
         const char *check_a = (a), *check_b = (b);                                                 \
         if (strcmp(check_a, check_b)) {                                                            \
-            fprintf(stderr, "%s:%d: \"%s\", expected \"%s\"\n", __FILE__, __LINE__, check_a,       \
-                check_b);                                                                          \
+            fprintf(                                                                               \
+                stderr, "%s:%d: \"%s\", expected \"%s\"\n", __FILE__, __LINE__, check_a, check_b); \
             check_failures++;                                                                      \
         }                                                                                          \
     } while (0)

@@ -234,6 +234,37 @@ static void image_mode(void)
     free(file.data);
 }
 
+/* Five of 8000 x 8000 are 305 million pixels; each is allowed by itself, and none has any data. */
+static void too_many_pixels(void)
+{
+    struct bytes file = png(four, 2, 2, SPNG_COLOR_TYPE_TRUECOLOR_ALPHA, 8, 16);
+    const uint8_t header[17] = {'I', 'H', 'D', 'R', 0, 0, 31, 64, 0, 0, 31, 64, 8, 6};
+    memcpy(file.data + 12, header, sizeof header);
+    uint32_t crc = 0xffffffff; /* section D.2 of the PNG specification, bit by bit */
+    for (int i = 0; i < 17 * 8; i++)
+        crc = (crc >> 1) ^ (((crc ^ (header[i / 8] >> i % 8)) & 1) ? 0xedb88320 : 0);
+    for (int i = 0; i < 4; i++)
+        file.data[29 + i] = (uint8_t)(~crc >> (24 - 8 * i));
+    const char *uri = base64(file.data, file.bytes);
+    char *json = text(
+        HEAD TRIANGLES(TRIANGLE(
+            "0")) ",\"materials\":[{"
+                  "\"pbrMetallicRoughness\":{\"baseColorTexture\":{\"index\":0},"
+                  "\"metallicRoughnessTexture\":{\"index\":1}},\"normalTexture\":{\"index\":2},"
+                  "\"occlusionTexture\":{\"index\":3},\"emissiveTexture\":{\"index\":4}}],"
+                  "\"textures\":[{\"source\":0},{\"source\":1},{\"source\":2},{\"source\":3},{"
+                  "\"source\":4}],"
+                  "\"images\":[{\"uri\":\"data:;base64,%s\"},{\"uri\":\"data:;base64,%s\"},"
+                  "{\"uri\":\"data:;base64,%s\"},{\"uri\":\"data:;base64,%s\"},"
+                  "{\"uri\":\"data:;base64,%s\"}]}",
+        uri, uri, uri, uri, uri);
+    struct imported r = import_json(json);
+    CHECK(r.error.code == PEN_TOO_LARGE && strstr(r.error.message, "together"));
+    imported_free(&r);
+    free(json);
+    free(file.data);
+}
+
 /* Images beyond the budget are halved: 7 of 4096 x 4096 are 112 million pixels. */
 static void reduction(void)
 {
@@ -274,6 +305,7 @@ int main(void)
     five_slots();
     formats();
     image_mode();
+    too_many_pixels();
     reduction();
     CHECK_DONE();
 }

@@ -1,0 +1,197 @@
+// Filtered depth tests from the series of passes/convolution.h.
+#include "receiver.glsl"
+#include "window.glsl"
+
+layout(binding = 7) uniform sampler2DArray basis;
+layout(binding = 8) uniform sampler2DArray basis_weighted;
+layout(std140, binding = 3) uniform ConvolutionBlock {
+    vec4 weight[4];
+    float range, offset, low, scale;
+} series;
+
+#define LAYERS ((P(terms) + 1) / 2)
+
+vec2 turned(vec2 a, vec2 b) // product of complex numbers
+{
+    return vec2(a.x * b.x - a.y * b.y, a.x * b.y + a.y * b.x);
+}
+
+// Means over the kernel of one lookup: x of 1 - f, the blocked share; when `weighted`, a constant,
+// y of (1 - f) z. `depth` is the receiver's, scaled and offset.
+vec2 series_lookup(float depth, vec2 uv, float level, bool weighted)
+{
+    float angle = 3.14159265 * depth;
+    vec2 phase = vec2(cos(angle), sin(angle)), turn = turned(phase, phase);
+    vec2 sum = vec2(0.5, 0.0);
+    if (weighted)
+        sum.y = 0.5 * textureLod(basis_weighted, vec3(uv, float(LAYERS)), level).r;
+    for (int i = 0; i < int(LAYERS); i++) {
+        vec2 next = turned(phase, turn);
+        vec4 weight = series.weight[i >> 1];
+        vec2 w = (i & 1) == 0 ? weight.xy : weight.zw;
+        vec4 phases = vec4(phase.x, -phase.y, next.x, -next.y) * w.xxyy;
+        sum.x -= dot(phases, 2.0 * textureLod(basis, vec3(uv, float(i)), level) - 1.0);
+        if (weighted)
+            sum.y -= dot(phases, 2.0 * textureLod(basis_weighted, vec3(uv, float(i)), level) - 1.0);
+        phase = turned(next, turn);
+    }
+    return sum;
+}
+
+// f for a caster x of scaled depth behind the receiver.
+float series_step(float x)
+{
+    float angle = 3.14159265 * x, sum = 0.5;
+    vec2 phase = vec2(cos(angle), sin(angle)), turn = turned(phase, phase);
+    for (int i = 0; i < int(LAYERS); i++) {
+        vec4 weight = series.weight[i >> 1];
+        vec2 w = (i & 1) == 0 ? weight.xy : weight.zw;
+        vec2 next = turned(phase, turn);
+        sum += w.x * phase.y + w.y * next.y;
+        phase = turned(next, turn);
+    }
+    return sum;
+}
+
+Receiver series_receiver(Surface s)
+{
+    return receiver_of(s, vec2(textureSize(basis, 0).xy));
+}
+
+// What is proven of the window q +- extent. Blocked only where the series says so too, past its step,
+// twice the offset before the receiver: else proven pixels stand out as spots.
+int receiver_window(Receiver r, vec2 extent)
+{
+    float margin = 2.0 * series.offset / series.range * (light.far_z - light.near_z);
+    return window_class(r.q, extent, r.plane, r.bias, margin, r.map_size);
+}
+
+// The receiver's scaled depth for a cell of the window: that of its plane at the cell's near corner,
+// so that a tilted receiver does not block itself.
+float cell_depth(Receiver r, vec2 offset, vec2 extent)
+{
+    float d = r.plane.depth + dot(r.plane.gradient, offset) - dot(abs(r.plane.gradient), extent);
+    float z = light_linear(clamp(d - r.bias, 0.0, 1.0));
+    return (z - light.near_z) / (light.far_z - light.near_z) * series.range;
+}
+
+// One lookup over the cell q + offset +- extent, and the share of the cell that the map covers;
+// outside the map nothing blocks. A trilinear lookup's kernel has the variance of a box that is
+// sqrt(3) of its texels wide, which picks the level.
+vec3 cell_lookup(Receiver r, vec2 offset, vec2 extent, bool weighted, out float depth)
+{
+    vec2 at = (r.q + offset - light.rect.xy) / r.metres, reach = extent / r.metres;
+    vec2 low = clamp(at - reach, vec2(0.0), r.map_size), high = clamp(at + reach, vec2(0.0), r.map_size);
+    vec2 cover = reach.x > 0.0 && reach.y > 0.0 ? (high - low) / (2.0 * reach) : vec2(1.0);
+    float level = log2(max(1.1547 * max(reach.x, reach.y), 1.0));
+    depth = cell_depth(r, offset, extent);
+    vec2 uv = 0.5 * (low + high) / r.map_size;
+    return vec3(series_lookup(depth - series.offset, uv, level, weighted), cover.x * cover.y);
+}
+
+// How a window of the light's shape is cut into about taps^2 cells that are nearly square.
+ivec2 window_cells(int taps)
+{
+    float aspect = light.extent.y > 0.0 ? sqrt(light.extent.x / light.extent.y) : 1.0;
+    int across = max(min(int(float(taps) * aspect + 0.5), taps * taps), 1);
+    return ivec2(across, (taps * taps) / across);
+}
+
+// Centre of cell i in [-1, 1]^2, and the cell's half extents: a grid, or its image on the disk
+// (Shirley and Chiu 1997), where all cells have the same area.
+vec2 cell_center(int i, ivec2 cells, out vec2 half_cell)
+{
+    vec2 u = (vec2(i % cells.x, i / cells.x) + 0.5) * 2.0 / vec2(cells) - 1.0;
+    half_cell = 1.0 / vec2(cells);
+    if (light.shape != SHAPE_DISK)
+        return u;
+    half_cell *= 0.886;
+    bool wide = abs(u.x) > abs(u.y);
+    float radius = wide ? u.x : u.y;
+    float other = wide ? u.y : u.x;
+    float angle = radius == 0.0 ? 0.0 : 0.78539816 * other / radius;
+    return radius * (wide ? vec2(cos(angle), sin(angle)) : vec2(sin(angle), cos(angle)));
+}
+
+// Visible share behind one lookup: f rescaled so that the ripple reaches 0 and 1. With `contact`
+// also so that a cell full of its nearest caster reaches 0, even when that caster is so near to the
+// receiver that it lies on the step: two planes are then told apart at most distances. Nearer still
+// the step is kept, or receivers that shadow themselves come out in specks.
+float cell_visibility(Receiver r, float f, float depth, vec2 offset, vec2 extent)
+{
+#ifdef RAW
+    return f;
+#else
+    float low = series.low, high = series.low + 1.0 / series.scale;
+    if (P(contact)) {
+        float nearest = min(min_max_window(r.q + offset, extent).x, light.far_z);
+        float z = (nearest - light.near_z) / (light.far_z - light.near_z) * series.range;
+        float x = z - depth + series.offset;
+        if (x > -series.offset)
+            low = max(low, min(series_step(x), high - 0.25));
+    }
+    return clamp((f - low) / (high - low), 0.0, 1.0);
+#endif
+}
+
+// Visible share of the light through the window q + offset +- extent.
+float window_visibility(Receiver r, vec2 offset, vec2 extent, int taps)
+{
+    ivec2 cells = window_cells(taps);
+    int count = cells.x * cells.y;
+    float sum = 0.0;
+    for (int i = 0; i < count; i++) {
+        vec2 half_cell;
+        vec2 center = cell_center(i, cells, half_cell);
+        float depth;
+        vec3 blocked = cell_lookup(r, offset + center * extent, half_cell * extent, false, depth);
+        float v = cell_visibility(
+            r, 1.0 - blocked.x, depth, offset + center * extent, half_cell * extent);
+        sum += (1.0 - v) * blocked.z;
+    }
+    return clamp(1.0 - sum / max(float(count), 1.0), 0.0, 1.0);
+}
+
+// Depth, m, behind which blockers in a window of the receiver are not told from the receiver: half
+// the step of the series before the near corner of a cell.
+float hidden_depth(Receiver r, vec2 extent, int taps)
+{
+    float depth = cell_depth(r, vec2(0.0), extent / vec2(window_cells(taps))) - series.offset;
+    return light.near_z + depth / series.range * (light.far_z - light.near_z);
+}
+
+// Mean depth of the blockers in the window q +- extent, m (Annen et al. 2008): the same series with
+// 1 - f for f, times z. The offset keeps lit texels from counting as half a blocker each; what is
+// left of them, `low`, is taken off. 0 where there are none.
+float window_blockers(Receiver r, vec2 extent, int taps)
+{
+    ivec2 cells = window_cells(taps);
+    int count = cells.x * cells.y;
+    vec2 sum = vec2(0.0);
+    for (int i = 0; i < count; i++) {
+        vec2 half_cell;
+        vec2 center = cell_center(i, cells, half_cell);
+        float depth;
+        vec3 blocked = cell_lookup(r, center * extent, half_cell * extent, true, depth);
+        if (blocked.x > series.low)
+            sum += (blocked.xy - series.low * vec2(1.0, depth)) * blocked.z;
+    }
+    if (sum.x <= 1e-4 * float(count))
+        return 0.0;
+    return light.near_z + sum.y / (sum.x * series.range) * (light.far_z - light.near_z);
+}
+
+// The depth that sizes the filter, m. Where a search sees nothing, though the pyramid could not
+// prove the window lit, only blockers behind hidden_depth are left, and these cannot cast through
+// more than the window of that depth (F3): it is searched next, in smaller cells.
+float blocker_depth(Receiver r, vec2 extent, int taps, float nearest_z, float receiver_z)
+{
+    float z = 0.0, hidden = receiver_z;
+    for (int round = 0; round < 3 && taps > 0 && z == 0.0; round++) {
+        z = window_blockers(r, extent, taps);
+        hidden = min(hidden_depth(r, extent, taps), receiver_z);
+        extent = min(extent, light_filter_extent(hidden, receiver_z));
+        extent = max(extent, r.metres);
+    }
+    return clamp(z == 0.0 ? hidden : z, min(nearest_z, receiver_z), receiver_z);
+}

@@ -1,0 +1,49 @@
+/* Rows and glue that the methods on convolution shadow maps share. */
+#pragma once
+#include "renderer/passes/convolution.h"
+#include "renderer/techniques/map_params.h"
+
+#define CONVOLUTION_ROWS(aggregate, default_terms, default_storage)                                \
+    PARAM(aggregate, terms, .def = default_terms, .min = 1, .max = CONVOLUTION_MAX_TERMS,          \
+        .specialise = 1,                                                                           \
+        .help = "Terms of the series; more make contacts sharper and the maps larger."),           \
+        PARAM(aggregate, damping, .def = 0.1, .min = 0, .max = 4,                                  \
+            .help = "Damps high terms against ringing; 0 keeps the bare series."),                 \
+        PARAM(aggregate, offset, .def = 0.3, .min = 0, .max = 1,                                   \
+            .unit = "1/terms of the depth range",                                                  \
+            .help = "Moves receivers towards the light, so that they do not block themselves; 0 "  \
+                    "doubles the visibility instead."),                                            \
+        PARAM(aggregate, contact, .def = 1, .specialise = 1,                                       \
+            .help =                                                                                \
+                "Measures each lookup against its nearest caster, which keeps contacts dark."),    \
+        PARAM(aggregate, storage, .def = default_storage, .choices = convolution_format_names,     \
+            .help = "Texels of the maps, two terms each.")
+#define RAW_ROW(aggregate)                                                                         \
+    PARAM(aggregate, raw, .def = 0,                                                                \
+        .help = "Shows the bare series: not rescaled to reach 0 and 1, nothing proven lit.")
+
+#define CONVOLUTION_DESC(params, with_depth)                                                       \
+    {                                                                                              \
+        .size = (params)->map_size, .terms = (params)->terms, .format = (params)->storage,         \
+        .damping = (params)->damping, .offset = (params)->offset, .weighted = (with_depth)         \
+    }
+
+/* Prepares the maps and runs the pass, whose body includes convolution.glsl, over the receivers. */
+static inline bool convolution_screen(struct technique_run *run,
+    const struct convolution_desc *desc, struct pass_screen pass, struct pen_error *error)
+{
+    const struct shadow_input *series = pass_convolution(run, desc, error);
+    const struct shadow_input *min_max =
+        series ? pass_caster_min_max(run, desc->size, error) : NULL;
+    if (!min_max)
+        return false;
+    struct convolution_block block = convolution_constants(desc);
+    struct pass_texture textures[] = {{UNIT_FREE, series->textures[0].name, GL_SAMPLE_TRILINEAR},
+        {UNIT_FREE + 1, series->textures[desc->weighted].name, GL_SAMPLE_TRILINEAR},
+        {UNIT_MIN_MAX, min_max->textures[0].name, GL_SAMPLE_NEAREST}};
+    pass.textures = textures;
+    pass.texture_count = 3;
+    pass.extra = &block;
+    pass.extra_bytes = sizeof block;
+    return pass_screen(run, &pass, error);
+}

@@ -1,0 +1,57 @@
+#include "renderer/passes/moments.h"
+#include "renderer/techniques/map_params.h"
+
+struct msm {
+    uint32_t map_size;
+    float bias;
+    uint32_t blur;
+    uint32_t precision;
+    float moment_bias;
+    float bleed;
+};
+
+static const char *const precision_names[] = {"float32", "unorm16", NULL};
+
+static const struct pen_param rows[] = {
+    MAP_SIZE_ROW(struct msm, 1024),
+    BIAS_ROW(struct msm),
+    PARAM(struct msm, blur, .def = 2, .min = 0, .max = 15, .unit = "texel",
+        .help = "Radius of the Gaussian that the map is blurred with."),
+    PARAM(struct msm, precision, .choices = precision_names, .specialise = 1,
+        .help = "Numbers of the moment map: 16 or 8 bytes a texel."),
+    PARAM(struct msm, moment_bias, .def = 0, .min = 0, .max = 0.01,
+        .help = "Share of a spread-out distribution mixed in against rounding; 0: by precision."),
+    PARAM(struct msm, bleed, .def = 0, .min = 0, .max = 0.9,
+        .help = "Visibility that counts as none; cuts light bleeding and narrows edges."),
+};
+
+static bool record(struct technique_run *run, struct pen_error *error)
+{
+    const struct msm *params = run->params;
+    struct moment_map desc = {.kind = params->precision ? MOMENTS_FOUR_UNORM : MOMENTS_FOUR,
+        .size = params->map_size,
+        .blur = params->blur};
+    const struct shadow_input *map = pass_moments(run, &desc, error);
+    if (!map)
+        return false;
+    struct pass_texture texture = {UNIT_FREE, map->textures[0].name, GL_SAMPLE_TRILINEAR};
+    return pass_screen(run,
+        &(struct pass_screen){
+            .name = "msm", .body = "msm.glsl", .textures = &texture, .texture_count = 1},
+        error);
+}
+
+const struct technique technique_msm = {
+    .info = {.name = "msm",
+        .title = "Moment shadow map",
+        .summary = "Blurs four powers of depth in the map and takes the least shadow that these "
+                   "moments allow (Hamburger moment problem).",
+        .citation = "C. Peters, R. Klein, Moment shadow mapping, I3D 2015",
+        .artefacts = "Light bleeds a little where three or more casters lie behind each other; "
+                     "edges have the width of the blur whatever the light.",
+        .cost_class = PEN_COST_CHEAP,
+        .textured = false,
+        .struct_size = sizeof(struct msm),
+        .params = {rows, sizeof rows / sizeof *rows}},
+    .record = record,
+};

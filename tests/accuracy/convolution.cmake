@@ -1,0 +1,8 @@
+add_library(penumbra_textured STATIC textured.c)
+target_link_libraries(penumbra_textured PUBLIC penumbra_accuracy)
+penumbra_accuracy_test(emission)
+target_link_libraries(accuracy_emission PRIVATE penumbra_textured)
+penumbra_accuracy_test(convolution)
+target_link_libraries(accuracy_convolution PRIVATE penumbra_textured)
+penumbra_accuracy_test(adaptive)
+target_link_libraries(accuracy_adaptive PRIVATE penumbra_textured)

@@ -1,0 +1,3 @@
+penumbra_accuracy_test(moments_blocks)
+penumbra_accuracy_test(moments_hard)
+penumbra_accuracy_test(moments_soft)

@@ -190,6 +190,18 @@ static void write_variant(struct pen_json *json, const struct plan_group *group,
     pen_json_end(json);
 }
 
+static void write_light(struct pen_json *json, const struct pen_light *light)
+{
+    pen_json_object(json, "light");
+    pen_json_string(json, "type", pen_light_type_names[light->type]);
+    pen_json_floats(json, "position", light->position, 3);
+    pen_json_floats(json, "target", light->target, 3);
+    pen_json_float(json, "width", light->width);
+    pen_json_float(json, "height", light->height);
+    pen_json_float(json, "radius", light->radius);
+    pen_json_end(json);
+}
+
 static void write_group(struct plan_group *group, const struct picture *pictures,
     struct timing *moving, struct timing *kept)
 {
@@ -203,6 +215,7 @@ static void write_group(struct plan_group *group, const struct picture *pictures
             pen_json_uint(&json, "triangles", pictures[i].result.triangles_drawn);
             pen_json_uint(&json, "width", pictures[i].width);
             pen_json_uint(&json, "height", pictures[i].height);
+            write_light(&json, &pictures[i].result.completed.lights[0]);
             break;
         }
     pen_json_array(&json, "variants");

@@ -39,6 +39,9 @@ const struct pen_route pen_routes[PEN_ROUTES] = {
     ROUTE(IMAGE_DELETE, "DELETE", "/v1/images/{id}", "deleteImage", "Remove an emission image"),
     ROUTE(STATS, "GET", "/v1/stats", "getStats", "Rolling timings per method and stage",
         .gives = PEN_BODY_STATS),
+    ROUTE(RESULT, "GET", "/v1/results/{id}", "getResult",
+        "A rendered image by its ETag, as long as it is kept", .gives = PEN_BODY_IMAGE,
+        .flags = PEN_ROUTE_CONDITIONAL),
 };
 
 /* Copies a token that may stand for the placeholder. */

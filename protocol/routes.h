@@ -23,6 +23,7 @@ enum pen_route_id {
     PEN_ROUTE_IMAGE_PUT,    /* PUT /v1/images/{id} */
     PEN_ROUTE_IMAGE_DELETE, /* DELETE /v1/images/{id} */
     PEN_ROUTE_STATS,        /* GET /v1/stats */
+    PEN_ROUTE_RESULT,       /* GET /v1/results/{id} */
     PEN_ROUTES
 };
 

@@ -2,6 +2,7 @@
 #include "renderer/frame.h"
 #include "renderer/generate/generate.h"
 #include "renderer/gl/context.h"
+#include "renderer/passes/scratch.h"
 #include "renderer/passes/shadow_cache.h"
 #include <stdlib.h>
 #include <string.h>
@@ -110,6 +111,7 @@ void pen_renderer_destroy(struct pen_renderer *r)
     gl_texture_destroy(&r->ctx.interleaved);
     gl_texture_destroy(&r->ctx.sample_scratch);
     gl_texture_destroy(&r->ctx.sum);
+    pass_scratch_finish(&r->ctx);
     gl.DeleteFramebuffers(1, &r->ctx.sum_framebuffer);
     gl.DeleteFramebuffers(1, &r->ctx.interleaved_framebuffer);
     GLuint buffers[] = {r->ctx.light_block, r->ctx.param_block};

@@ -13,6 +13,7 @@ static const size_t payload[CHANNEL_KINDS] = {
     [CHANNEL_WARM] = sizeof(struct channel_warm),
     [CHANNEL_DONE] = sizeof(struct pen_result),
     [CHANNEL_JOB] = sizeof(struct channel_job),
+    [CHANNEL_RESIDENT] = sizeof(struct channel_resident),
     [CHANNEL_DROP] = sizeof(struct channel_drop),
 };
 

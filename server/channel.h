@@ -18,8 +18,9 @@ enum channel_kind {
     CHANNEL_STARTED,   /* worker: the GL thread takes this job */
     CHANNEL_RENDERED,  /* worker: the GL thread is done with it, encoding follows */
     CHANNEL_DONE, /* worker: the answer; one descriptor, a sealed memfd, when there is an image */
-    CHANNEL_JOB,  /* front end: descriptors: the scene's blob, then `image_count` images */
-    CHANNEL_DROP, /* front end: the scene was deleted */
+    CHANNEL_RESIDENT, /* worker: the scenes in GPU memory, when they have changed */
+    CHANNEL_JOB,      /* front end: descriptors: the scene's blob, then `image_count` images */
+    CHANNEL_DROP,     /* front end: the scene was deleted */
     CHANNEL_KINDS
 };
 
@@ -38,6 +39,11 @@ struct channel_job {
     uint32_t image_count;
     uint8_t images[PEN_MAX_LIGHTS][PEN_ID_BYTES]; /* in the order of the descriptors */
 };
+#define CHANNEL_MAX_RESIDENT 128 /* the ones used last, if there are more */
+struct channel_resident {
+    uint32_t count, reserved;
+    uint8_t scenes[CHANNEL_MAX_RESIDENT][PEN_ID_BYTES];
+};
 struct channel_drop {
     uint8_t scene[PEN_ID_BYTES];
 };
@@ -50,6 +56,7 @@ struct channel_message {
         struct channel_warm warm;
         struct channel_job job_data;
         struct channel_drop drop;
+        struct channel_resident resident;
         struct pen_error refused;
         struct pen_result result;
     };

@@ -33,7 +33,7 @@ static const struct handler handlers[ROUTE_NONE] = {
     [PEN_ROUTE_STATS] = {routes_stats},
     [ROUTE_HOME] = {routes_home},
     [ROUTE_DOCS] = {routes_docs},
-    [ROUTE_RESULT] = {routes_result},
+    [PEN_ROUTE_RESULT] = {routes_result},
 };
 
 /* ---- answers ---- */
@@ -163,11 +163,6 @@ static bool find_route(struct call *call, struct pen_error *error)
             call->route_label = pages[i].path;
             strcpy(allow, "GET, HEAD");
         }
-    if (!strncmp(x->path, "/v1/results/", 12) && pen_id_from_hex(x->path + 12, call->id)) {
-        call->route = get ? ROUTE_RESULT : ROUTE_NONE;
-        call->route_label = "/v1/results/{id}";
-        strcpy(allow, "GET, HEAD");
-    }
     if (!*allow) {
         if (pen_route_find(x->method, x->path, &match)) {
             call->route = match.route->id;

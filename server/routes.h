@@ -7,7 +7,7 @@
 extern const struct http_callbacks routes_callbacks, routes_admin_callbacks;
 
 /* Addresses that are not in the contract's table. */
-enum route_extra { ROUTE_HOME = PEN_ROUTES, ROUTE_DOCS, ROUTE_RESULT, ROUTE_NONE };
+enum route_extra { ROUTE_HOME = PEN_ROUTES, ROUTE_DOCS, ROUTE_NONE };
 
 struct call {
     struct service *service;

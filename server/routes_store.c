@@ -72,6 +72,18 @@ bool routes_begin_upload(struct call *call)
     return false;
 }
 
+/* The stored document, with what has become of the scene since it was written. */
+static char *describe(struct call *call, const uint8_t id[PEN_ID_BYTES], struct pen_error *error)
+{
+    static const char at_import[] = "\"resident\":false,", now[] = "\"resident\":true, ";
+    char *text = describe_stored(call->service->store, kind_of(call), id, error);
+    /* Inside a name the quotes would be escaped: only the member itself can match. */
+    char *member = text && kind_of(call) == STORE_SCENES ? strstr(text, at_import) : NULL;
+    if (member && worker_pool_is_resident(call->service->pool, id))
+        memcpy(member, now, sizeof now - 1);
+    return text;
+}
+
 /* An importer's thread. */
 static void finish(struct import_task *task)
 {
@@ -79,7 +91,7 @@ static void finish(struct import_task *task)
     char hex[PEN_ID_HEX + 1];
     char *text = NULL;
     if (task->error.code == PEN_OK)
-        text = describe_stored(call->service->store, task->kind, task->id, &task->error);
+        text = describe(call, task->id, &task->error);
     if (!text) {
         routes_fail(call, &task->error, 2);
         return;
@@ -154,7 +166,7 @@ void routes_list(struct call *call)
     pen_json_array(&json, kind == STORE_SCENES ? "scenes" : "images");
     for (uint32_t i = 0; i < shown; i++) {
         struct pen_error gone = {0};
-        char *text = describe_stored(store, kind, entries[i].id, &gone);
+        char *text = describe(call, entries[i].id, &gone);
         if (text) /* deleted meanwhile: left out */
             pen_json_raw(&json, NULL, text);
         free(text);
@@ -174,7 +186,7 @@ void routes_list(struct call *call)
 void routes_describe(struct call *call)
 {
     struct pen_error error = {0};
-    char *text = describe_stored(call->service->store, kind_of(call), call->id, &error);
+    char *text = describe(call, call->id, &error);
     if (text)
         routes_json(call, 200, text);
     else

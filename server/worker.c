@@ -19,7 +19,8 @@
 struct worker {
     struct pen_renderer *renderer;
     struct worker_encoder *encoder;
-    enum worker_warm_up warm_up; /* what is still to be done */
+    enum worker_warm_up warm_up;      /* what is still to be done */
+    struct channel_resident resident; /* as told last, most recently used first */
 };
 
 static void send_or_exit(const struct channel_message *message)
@@ -36,6 +37,29 @@ static void warm_up(struct worker *worker)
     message.warm.warm_ms = (float)pen_renderer_warm_up(worker->renderer);
     message.warm.gpu_bytes = pen_renderer_gpu_bytes(worker->renderer);
     worker->warm_up = WORKER_NO_WARM_UP;
+    send_or_exit(&message);
+}
+
+/* Tells the daemon which scenes are in GPU memory when that has changed; `used` (or NULL) was used
+ * just now. */
+static void tell_resident(struct worker *worker, const uint8_t *used)
+{
+    static struct channel_message message;
+    struct channel_resident *now = &message.resident;
+    memset(now, 0, sizeof *now);
+    if (used && pen_renderer_has_scene(worker->renderer, used))
+        memcpy(now->scenes[now->count++], used, PEN_ID_BYTES);
+    for (uint32_t i = 0; i < worker->resident.count && now->count < CHANNEL_MAX_RESIDENT; i++) {
+        const uint8_t *scene = worker->resident.scenes[i];
+        bool first = used && !memcmp(scene, used, PEN_ID_BYTES);
+        if (!first && pen_renderer_has_scene(worker->renderer, scene))
+            memcpy(now->scenes[now->count++], scene, PEN_ID_BYTES);
+    }
+    if (!memcmp(now, &worker->resident, sizeof *now))
+        return;
+    worker->resident = *now;
+    message.version = CHANNEL_VERSION;
+    message.kind = CHANNEL_RESIDENT;
     send_or_exit(&message);
 }
 
@@ -92,10 +116,17 @@ static bool run_job(
     result->scene_was_resident = was_resident;
     result->device = *pen_renderer_device(worker->renderer);
     result->gpu_bytes = pen_renderer_gpu_bytes(worker->renderer);
+    tell_resident(worker, job->request.scene); /* before the answer, so that both agree */
     note.kind = CHANNEL_RENDERED;
     send_or_exit(&note);
     worker_encoder_submit(worker->encoder, item); /* failures too: answers keep their order */
     return true;
+}
+
+static void drop(struct worker *worker, const uint8_t scene[PEN_ID_BYTES])
+{
+    pen_renderer_drop_scene(worker->renderer, scene);
+    tell_resident(worker, NULL);
 }
 
 /* Returns the exit status once the daemon hangs up or the context is lost. */
@@ -122,7 +153,7 @@ static int serve(struct worker *worker)
         if (message.kind == CHANNEL_JOB)
             alive = run_job(worker, &message, &fds);
         else if (message.kind == CHANNEL_DROP)
-            pen_renderer_drop_scene(worker->renderer, message.drop.scene);
+            drop(worker, message.drop.scene);
         channel_close_fds(&fds);
         if (!alive)
             return EXIT_LOST;

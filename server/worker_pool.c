@@ -38,6 +38,7 @@ struct slot {
     uint32_t index;
     uint8_t drops[MAX_DROPS][PEN_ID_BYTES]; /* guarded by pool->lock */
     uint32_t drop_count;                    /* guarded by pool->lock */
+    struct channel_resident resident;       /* guarded by pool->lock */
     /* Only the slot's thread: */
     struct process process;
     int socket;
@@ -50,7 +51,7 @@ struct slot {
 struct worker_pool {
     struct worker_pool_config config;
     struct quarantine *quarantine;
-    pthread_mutex_t lock; /* guards numbers, and the drops of the slots */
+    pthread_mutex_t lock; /* guards numbers, and the drops and residents of the slots */
     struct worker_pool_numbers numbers;
     bool stopping; /* atomic */
     struct slot slots[16];
@@ -167,6 +168,9 @@ static void bury(struct slot *slot)
         pool->numbers.pids[slot->index] = 0;
         pthread_mutex_unlock(&pool->lock);
     }
+    pthread_mutex_lock(&pool->lock);
+    slot->resident.count = 0;
+    pthread_mutex_unlock(&pool->lock);
     slot->failures = slot->said_hello ? 0 : slot->failures + 1;
     slot->is_replacement = true;
     for (int i = 0; i < IN_FLIGHT; i++) {
@@ -279,6 +283,13 @@ static bool on_message(
             flight->phase = message->kind == CHANNEL_STARTED ? PHASE_RENDERING : PHASE_ENCODING;
             flight->since_ns = clock_now_ns();
         }
+        return true;
+    case CHANNEL_RESIDENT:
+        pthread_mutex_lock(&slot->pool->lock);
+        slot->resident = message->resident;
+        if (slot->resident.count > CHANNEL_MAX_RESIDENT)
+            slot->resident.count = 0;
+        pthread_mutex_unlock(&slot->pool->lock);
         return true;
     case CHANNEL_DONE:
         on_done(slot, message, fds);
@@ -487,6 +498,17 @@ void worker_pool_drop_scene(struct worker_pool *pool, const uint8_t scene[PEN_ID
 uint32_t worker_pool_quarantine_s(struct worker_pool *pool, const uint8_t scene[PEN_ID_BYTES])
 {
     return quarantine_remaining_s(pool->quarantine, scene);
+}
+
+bool worker_pool_is_resident(struct worker_pool *pool, const uint8_t scene[PEN_ID_BYTES])
+{
+    bool found = false;
+    pthread_mutex_lock(&pool->lock);
+    for (uint32_t i = 0; i < pool->config.workers; i++)
+        for (uint32_t k = 0; k < pool->slots[i].resident.count; k++)
+            found = found || !memcmp(pool->slots[i].resident.scenes[k], scene, PEN_ID_BYTES);
+    pthread_mutex_unlock(&pool->lock);
+    return found;
 }
 
 void worker_pool_read(struct worker_pool *pool, struct worker_pool_numbers *numbers)

@@ -30,6 +30,8 @@ void worker_pool_destroy(struct worker_pool *pool);
 void worker_pool_wake(struct worker_pool *pool);
 /* Tells the workers that a scene was deleted. */
 void worker_pool_drop_scene(struct worker_pool *pool, const uint8_t scene[PEN_ID_BYTES]);
+/* A worker has the scene in GPU memory. */
+bool worker_pool_is_resident(struct worker_pool *pool, const uint8_t scene[PEN_ID_BYTES]);
 /* Seconds for which a scene that ended two workers is still refused; 0: it is not. */
 uint32_t worker_pool_quarantine_s(struct worker_pool *pool, const uint8_t scene[PEN_ID_BYTES]);
 

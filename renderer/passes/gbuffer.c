@@ -4,7 +4,7 @@
 static void fit(struct gbuffer *g, uint32_t width, uint32_t height, bool emission)
 {
     bool made = gl_texture_fit(&g->depth, GL_DEPTH_COMPONENT32F, width, height, 0, 1);
-    made |= gl_texture_fit(&g->normal, GL_RGBA16F, width, height, 0, 1);
+    made |= gl_texture_fit(&g->normal, GL_RGBA16, width, height, 0, 1);
     made |= gl_texture_fit(&g->albedo, GL_RGBA8, width, height, 0, 1);
     made |= gl_texture_fit(&g->surface, GL_RGBA8, width, height, 0, 1);
     if (emission)

@@ -49,6 +49,10 @@ void main()
         shading = geometric;
     if (dot(shading, geometric) < 0.0)
         shading = -shading;
+    // Derivatives of single-precision positions are good to about 1e-3; where the vertex normal says
+    // the same (a flat face) it is the more exact one, and receiver planes need that at grazing light.
+    if (dot(shading, geometric) > 0.99998)
+        geometric = shading;
 #ifdef GROUND
     out_normal = vec4(octahedral_encode(vec3(0.0, geometric.y > 0.0 ? 1.0 : -1.0, 0.0)),
         octahedral_encode(shading));

@@ -11,7 +11,11 @@ void main()
     if (depth == 0.0)
         discard;
     Surface s = surface_at(pixel, depth);
-    if (light.cube != 0 && max(abs(s.p.x), abs(s.p.y)) > s.p.z)
+    float border = 1.0;
+#ifdef WITH_BORDER // also what the map of a cube's face shows beyond the face
+    border = 1.02 + 1.02 * light.extent.x / light.near_z;
+#endif
+    if (light.cube != 0 && max(abs(s.p.x), abs(s.p.y)) > border * s.p.z)
         discard;
     if (light.omni != 0 && s.p.z <= light.near_z)
         discard;

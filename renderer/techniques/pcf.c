@@ -1,3 +1,4 @@
+#include "renderer/passes/classify.h"
 #include "renderer/passes/passes.h"
 #include "renderer/techniques/map_params.h"
 
@@ -21,10 +22,18 @@ static bool record(struct technique_run *run, struct pen_error *error)
 {
     const struct pcf *params = run->params;
     const struct shadow_input *map = pass_caster_map(run, params->map_size, error);
-    return map && pass_screen(run,
-                      &(struct pass_screen){
-                          .name = "pcf", .body = "pcf.glsl", .shadow = &map->textures[0]},
-                      error);
+    if (!map)
+        return false;
+    const struct gl_texture *tiles = NULL;
+    if (run->request->classify.on) {
+        const struct shadow_input *min_max = pass_caster_min_max(run, params->map_size, error);
+        if (!min_max || !(tiles = pass_classify(run, min_max, params->radius + 2, error)))
+            return false;
+    }
+    return pass_screen(run,
+        &(struct pass_screen){
+            .name = "pcf", .body = "pcf.glsl", .shadow = &map->textures[0], .tiles = tiles},
+        error);
 }
 
 const struct technique technique_pcf = {

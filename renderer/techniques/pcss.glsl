@@ -7,7 +7,9 @@ vec4 visibility(Surface s)
     vec2 q = light_project(s.p), texel = light_texel(shadow_map);
     vec2 inverse_size = 1.0 / (light.rect.zw - light.rect.xy), uv = light_uv(q);
     ReceiverPlane plane = receiver_plane(s.p, s.n);
-    float bias = P(bias) * s.p.z * light_depth_slope(s.p.z);
+    // A tap lands anywhere in its texel, whose depth is that of its centre: half a texel along the
+    // plane's slope is the most they can differ by on the receiver itself.
+    float bias = P(bias) * s.p.z * light_depth_slope(s.p.z) + 0.5 * dot(abs(plane.gradient), texel);
     vec2 shift = P(smooth) ? frame_shift(s.pixel) : vec2(0.5);
 
     float nearest_z;

@@ -2,11 +2,14 @@
 for more than it has."""
 import json
 import os
-import re
+import shutil
+import ssl
+import subprocess
 import tempfile
 import threading
 import time
 import unittest
+import urllib.request
 
 import harness
 from harness import HEAVY, SMALL, SLOW, Daemon, grid_scene, wait
@@ -165,6 +168,10 @@ class Limits(unittest.TestCase):
             pictures.setdefault(s, set()).add(d.render(s, SMALL).body)
             self.assertLessEqual(record(s)["gpu_bytes"], budget + working_set)
         self.assertEqual({len(p) for p in pictures.values()}, {1})
+        told = lambda s: d.get("/v1/scenes/" + s).json()["resident"]
+        self.assertEqual((told(scenes[0]), told(scenes[4])), (True, False))
+        listed = {s["id"]: s["resident"] for s in d.get("/v1/scenes").json()["scenes"]}
+        self.assertEqual((listed[scenes[0]], listed[scenes[4]]), (True, False))
         self.assertFalse(record(scenes[4])["cache"]["scene_resident"])
         self.assertTrue(record(scenes[4])["cache"]["scene_resident"])
         whole = self.daemon("--gpu-memory=1M")
@@ -207,6 +214,33 @@ class Limits(unittest.TestCase):
         self.addCleanup(refused.kill)
         self.assertEqual(refused.process.wait(30 * SLOW), 3)
         self.assertIn("no device", refused.log())
+
+    def test_tls(self):
+        folder = tempfile.mkdtemp()
+        self.addCleanup(shutil.rmtree, folder)
+        cert, key = os.path.join(folder, "cert"), os.path.join(folder, "key")
+        made = subprocess.run(["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt",
+                               "ec_paramgen_curve:prime256v1", "-nodes", "-days", "2", "-subj",
+                               "/CN=localhost", "-addext", "subjectAltName=IP:127.0.0.1",
+                               "-keyout", key, "-out", cert], capture_output=True)
+        if made.returncode:
+            self.skipTest("openssl cannot make a certificate")
+        d = self.daemon("--tls-cert=" + cert, "--tls-key=" + key)
+        context = ssl.create_default_context(cafile=cert)
+        ask = lambda method, path, body=None, kind=None: urllib.request.urlopen(
+            urllib.request.Request("https://127.0.0.1:%d%s" % (d.port, path), body,
+                                   {"Content-Type": kind} if kind else {}, method=method),
+            context=context, timeout=30 * SLOW)
+        data = grid_scene(60, "over TLS")
+        scene = json.load(ask("POST", "/v1/scenes", data, "model/gltf-binary"))["id"]
+        picture = ask("POST", "/v1/scenes/%s/render" % scene, json.dumps(SMALL).encode(),
+                      "application/json").read()
+        self.assertTrue(picture.startswith(b"\x89PNG"))
+        got, closed = harness.raw(d.port, b"GET /v1 HTTP/1.1\r\nHost: x\r\n\r\n", timeout=3)
+        self.assertNotIn(b"HTTP/1.1 200", got)
+        self.assertTrue(closed)
+        with self.assertRaises(RuntimeError):
+            Daemon("--tls-cert=" + key, "--tls-key=" + cert)
 
     def test_cors(self):
         d = self.daemon("--cors-origin=https://example.org")

@@ -1,0 +1,21 @@
+// Per pixel: hard visibility, and the Gaussian that stands for the light on the screen (s1, skew,
+// s2; see screen_spread). What is proved to be lit is left as the target starts: (1, 0, 0, 0).
+#include "penumbra.glsl"
+#include "blockers.glsl"
+
+vec4 visibility(Surface s)
+{
+    vec2 q = light_project(s.p), texel = light_texel(shadow_map);
+    ReceiverPlane plane = receiver_plane(s.p, s.n);
+    float bias = P(bias) * s.p.z * light_depth_slope(s.p.z), depth;
+    vec2 least = max(P(min_filter), 0.25) * texel;
+    BlockerSearch search = blocker_window(s, plane, q, least, bias);
+    if (search.lit)
+        discard;
+    vec2 extent = blocker_extent(s, plane, search, light_uv(q), least, bias);
+    bool lit = hard_lit(s, plane, q, texel, bias, depth);
+    vec3 spread = screen_spread(
+        pixels_per_map(s), light_deviation() * extent, 0.4 * float(P(max_radius)));
+    // All zeros are left to receivers that no part of the light can reach.
+    return vec4(lit ? 1.0 : 0.0, spread.xy, max(spread.z, 1e-3));
+}

@@ -1,0 +1,245 @@
+#include "renderer/passes/interleave.h"
+#include "renderer/passes/scratch.h"
+#include "renderer/techniques/map_params.h"
+#include <stdio.h>
+
+static const char *const variant_names[] = {"pcf", "direct", NULL};
+enum { VARIANT_PCF, VARIANT_DIRECT };
+
+struct erosion {
+    uint32_t variant;
+    uint32_t map_size;
+    float bias;
+    uint32_t max_radius;
+    uint32_t filter_taps;
+    float min_filter;
+    pen_flag smooth;
+    uint32_t fit_radius;
+    float depth_sigma;
+};
+
+static const struct pen_param rows[] = {
+    PARAM(struct erosion, variant, .choices = variant_names,
+        .help = "Percentage-closer filtering of the penumbrae found (pcf), or a shadow factor "
+                "from the distance to the nearest edge (direct)."),
+    MAP_SIZE_ROW(struct erosion, 2048),
+    BIAS_ROW(struct erosion),
+    PARAM(struct erosion, max_radius, .def = 128, .min = 2, .max = 512, .unit = "px",
+        .help = "Largest half width of a penumbra on the screen."),
+    PARAM(struct erosion, filter_taps, .def = 32, .min = 1, .max = 256, .specialise = 1,
+        .help = "Depth comparisons of the filter; variant pcf."),
+    PARAM(struct erosion, min_filter, .def = 1, .min = 0, .max = 16, .unit = "texel",
+        .help = "Least half width of the filter; variant pcf."),
+    PARAM(struct erosion, smooth, .def = 1, .specialise = 1,
+        .help = "Shifts the taps per pixel and averages 4 x 4 pixels of wide penumbrae; variant "
+                "pcf."),
+    PARAM(struct erosion, fit_radius, .def = 4, .min = 1, .max = 8, .unit = "px",
+        .help = "Reach of the line fit around an edge pixel; variant direct."),
+    PARAM(struct erosion, depth_sigma, .def = 0.01, .min = 0.0001, .max = 1,
+        .help = "Distance from the receiver's plane beyond which an edge is another surface's, as "
+                "a fraction of the distance to the camera; variant direct."),
+};
+
+/* Runs `body` over this face's receivers into a scratch texture. */
+static bool write_scratch(struct technique_run *run, enum pass_scratch_slot slot, const char *body,
+    const struct shadow_input *map, bool border, struct pen_error *error)
+{
+    const struct shadow_input *min_max = pass_caster_min_max(run, map->textures[0].width, error);
+    if (!min_max)
+        return false;
+    const struct gl_texture *target = &run->ctx->scratch[slot];
+    GLuint framebuffer = gl_framebuffer_create(&target, 1, NULL);
+    struct pass_texture pyramid = {UNIT_MIN_MAX, min_max->textures[0].name, GL_SAMPLE_NEAREST};
+    bool ok = pass_screen(run,
+        &(struct pass_screen){.name = slot == SCRATCH_HARD ? "hard shadows" : "penumbra axes",
+            .body = body,
+            .defines = border ? "#define WITH_BORDER\n" : NULL,
+            .shadow = &map->textures[0],
+            .textures = &pyramid,
+            .texture_count = 1,
+            .framebuffer = framebuffer},
+        error);
+    gl.DeleteFramebuffers(1, &framebuffer);
+    return ok;
+}
+
+struct fill {
+    const char *name, *fragment, *defines;
+    const struct gl_texture *target;
+    GLint target_level;
+    struct pass_texture textures[8];
+    uint32_t texture_count;
+    int32_t block[4];
+};
+
+static bool fill(struct technique_run *run, const struct fill *f, struct pen_error *error)
+{
+    GLuint framebuffer = run->vis_framebuffer;
+    uint32_t width = run->width, height = run->height;
+    if (f->target) {
+        gl.CreateFramebuffers(1, &framebuffer);
+        gl.NamedFramebufferTexture(
+            framebuffer, GL_COLOR_ATTACHMENT0, f->target->name, f->target_level);
+        width = width >> f->target_level ? width >> f->target_level : 1;
+        height = height >> f->target_level ? height >> f->target_level : 1;
+    }
+    bool ok = pass_fill(run->ctx,
+        &(struct pass_fill){.name = f->name,
+            .fragment = f->fragment,
+            .defines = f->defines,
+            .stage = PEN_STAGE_TECHNIQUE,
+            .textures = f->textures,
+            .texture_count = f->texture_count,
+            .framebuffer = framebuffer,
+            .width = width,
+            .height = height,
+            .extra = f->block,
+            .extra_bytes = sizeof f->block,
+            .info = &run->technique->info,
+            .params = run->params},
+        error);
+    if (f->target)
+        gl.DeleteFramebuffers(1, &framebuffer);
+    return ok;
+}
+
+static bool build_edge_pyramid(struct technique_run *run, const struct gl_texture *hard,
+    const struct gl_texture *pyramid, struct pen_error *error)
+{
+    for (uint32_t level = 0; level < pyramid->levels; level++) {
+        struct fill f = {.name = level ? "edge pyramid" : "edges",
+            .fragment = level ? "erosion_pyramid.frag" : "erosion_edges.frag",
+            .defines = "#define PYRAMID\n",
+            .target = pyramid,
+            .target_level = (GLint)level,
+            .textures = {{UNIT_FREE, level ? pyramid->name : hard->name, GL_SAMPLE_NEAREST}},
+            .texture_count = 1,
+            .block = {(int32_t)level - 1}};
+        if (!fill(run, &f, error))
+            return false;
+    }
+    return true;
+}
+
+static bool record_pcf(
+    struct technique_run *run, const struct shadow_input *map, struct pen_error *error)
+{
+    static const float lit[4] = {1};
+    const struct erosion *params = run->params;
+    const struct gl_texture *hard = pass_scratch(run, SCRATCH_HARD, GL_RGBA16F, 1);
+    const struct gl_texture *pyramid = pass_scratch(run, SCRATCH_EDGES, GL_RGBA16F, 0);
+    /* Each face filters its own receivers in its own map, so it needs its own edges, also those
+     * that lie beyond its border. */
+    pass_scratch_clear(hard, lit);
+    if (!write_scratch(run, SCRATCH_HARD, "erosion_hard.glsl", map, true, error) ||
+        !build_edge_pyramid(run, hard, pyramid, error))
+        return false;
+    struct pass_texture textures[] = {{UNIT_FREE, hard->name, GL_SAMPLE_NEAREST},
+        {UNIT_FREE + 1, pyramid->name, GL_SAMPLE_TRILINEAR}};
+    struct pass_screen pass = {.name = "erosion",
+        .body = "erosion.glsl",
+        .shadow = &map->textures[0],
+        .textures = textures,
+        .texture_count = 2};
+    return params->smooth.on ? pass_interleaved(run, &pass, error) : pass_screen(run, &pass, error);
+}
+
+static bool fit_lines(struct technique_run *run, struct pen_error *error)
+{
+    const struct gl_texture *scratch = run->ctx->scratch;
+    const struct gl_texture *edges = pass_scratch(run, SCRATCH_ALL, GL_RG16F, 1);
+    const struct gl_texture *lines = pass_scratch(run, SCRATCH_LINES, GL_RGBA16F, 1);
+    struct fill find = {.name = "edges",
+        .fragment = "erosion_edges.frag",
+        .target = edges,
+        .textures = {{UNIT_FREE, scratch[SCRATCH_HARD].name, GL_SAMPLE_NEAREST}},
+        .texture_count = 1};
+    struct fill fit = {.name = "line fit",
+        .fragment = "erosion_lines.frag",
+        .target = lines,
+        .textures = {{UNIT_FREE, edges->name, GL_SAMPLE_NEAREST}},
+        .texture_count = 1};
+    return fill(run, &find, error) && fill(run, &fit, error);
+}
+
+static bool flood(
+    struct technique_run *run, const struct gl_texture **seeds, struct pen_error *error)
+{
+    const struct erosion *params = run->params;
+    const struct gl_texture *scratch = run->ctx->scratch;
+    const struct gl_texture *pair[2] = {pass_scratch(run, SCRATCH_LIT, GL_RG16F, 1),
+        pass_scratch(run, SCRATCH_LIT_NEXT, GL_RG16F, 1)};
+    int32_t step = 1;
+    while (2 * step < (int32_t)params->max_radius)
+        step *= 2;
+    for (uint32_t i = 0; step; i++, step /= 2) {
+        struct fill f = {.name = "jump flood",
+            .fragment = "erosion_flood.frag",
+            .defines = i ? NULL : "#define FIRST\n",
+            .target = pair[i & 1],
+            .textures = {{UNIT_DEPTH, run->gbuffer->depth.name, GL_SAMPLE_NEAREST},
+                {UNIT_NORMAL, run->gbuffer->normal.name, GL_SAMPLE_NEAREST},
+                {UNIT_FREE, scratch[SCRATCH_HARD].name, GL_SAMPLE_NEAREST},
+                {UNIT_FREE + 1, scratch[SCRATCH_AXES].name, GL_SAMPLE_NEAREST},
+                {UNIT_FREE + 2, scratch[SCRATCH_LINES].name, GL_SAMPLE_NEAREST},
+                {UNIT_FREE + 3, pair[~i & 1]->name, GL_SAMPLE_NEAREST}},
+            .texture_count = i ? 6 : 5,
+            .block = {step}};
+        if (!fill(run, &f, error))
+            return false;
+        *seeds = pair[i & 1];
+    }
+    return true;
+}
+
+static bool record_direct(
+    struct technique_run *run, const struct shadow_input *map, struct pen_error *error)
+{
+    static const float lit[4] = {1};
+    const struct gl_texture *hard = pass_scratch(run, SCRATCH_HARD, GL_RGBA16F, 1);
+    const struct gl_texture *axes = pass_scratch(run, SCRATCH_AXES, GL_RGBA16F, 1);
+    if (pass_is_first_face(run))
+        pass_scratch_clear(hard, lit);
+    if (!write_scratch(run, SCRATCH_HARD, "erosion_hard.glsl", map, false, error) ||
+        !write_scratch(run, SCRATCH_AXES, "erosion_axes.glsl", map, false, error))
+        return false;
+    /* From here on nothing is left of light space: edges run on from face to face. */
+    if (!pass_is_last_face(run))
+        return true;
+    const struct gl_texture *seeds = NULL;
+    if (!fit_lines(run, error) || !flood(run, &seeds, error))
+        return false;
+    struct fill f = {.name = "erosion",
+        .fragment = "erosion_direct.frag",
+        .textures = {{UNIT_FREE, hard->name, GL_SAMPLE_NEAREST},
+            {UNIT_FREE + 1, axes->name, GL_SAMPLE_NEAREST},
+            {UNIT_FREE + 2, run->ctx->scratch[SCRATCH_LINES].name, GL_SAMPLE_NEAREST},
+            {UNIT_FREE + 3, seeds->name, GL_SAMPLE_NEAREST}},
+        .texture_count = 4};
+    return fill(run, &f, error);
+}
+
+static bool record(struct technique_run *run, struct pen_error *error)
+{
+    const struct erosion *params = run->params;
+    const struct shadow_input *map = pass_caster_map(run, params->map_size, error);
+    return map && (params->variant == VARIANT_PCF ? record_pcf(run, map, error)
+                                                  : record_direct(run, map, error));
+}
+
+const struct technique technique_erosion = {
+    .info = {.name = "erosion",
+        .title = "Contact hardening by erosion",
+        .summary = "Finds the edges of hard shadows on the screen and widens each by its own "
+                   "penumbra: then filters the shadow map there, or derives the shadow from the "
+                   "distance to a line fitted to the edge.",
+        .citation = "A. Klein, A. Nischwitz, P. Obermeier, Contact hardening soft shadows using "
+                    "erosion, WSCG 2014",
+        .artefacts = "Shadow edges off the screen or behind an object have no penumbra; where many "
+                     "edges meet (foliage) the direct variant knows only the nearest.",
+        .cost_class = PEN_COST_MEDIUM,
+        .textured = false,
+        .struct_size = sizeof(struct erosion),
+        .params = {rows, sizeof rows / sizeof *rows}},
+    .record = record,
+};

@@ -1,0 +1,65 @@
+// Klein et al. 2014, variant pcf: the penumbra grows from the edges of the hard shadow by their own
+// width, found in the edge pyramid, and percentage-closer filtering runs only there.
+#include "taps.glsl"
+layout(binding = 7) uniform sampler2D hard_map;
+layout(binding = 8) uniform sampler2D edge_pyramid; // trilinear
+
+// The largest W of the edges within `radius` pixels, from 2 x 2 texels; 0: none.
+float edge_within(ivec2 pixel, float radius)
+{
+    int level = int(ceil(log2(2.0 * radius)));
+    ivec2 last = max(ivec2(view.viewport.xy) >> level, ivec2(1)) - 1, r = ivec2(ceil(radius));
+    ivec2 a = clamp((pixel - r) >> level, ivec2(0), last);
+    ivec2 b = clamp((pixel + r) >> level, ivec2(0), last);
+    return max(max(texelFetch(edge_pyramid, a, level).x, texelFetch(edge_pyramid, b, level).x),
+        max(texelFetch(edge_pyramid, ivec2(b.x, a.y), level).x,
+            texelFetch(edge_pyramid, ivec2(a.x, b.y), level).x));
+}
+
+// Mean W of the edges around, by a tent of 5 x 5 filtered taps: the pyramid's maxima would show their
+// blocks.
+float edge_mean(ivec2 pixel, float radius)
+{
+    float lod = max(log2(radius) - 1.0, 0.0);
+    vec2 sum = vec2(1e-12, 0.0);
+    for (int i = 0; i < 25; i++) {
+        vec2 at = vec2(i % 5, i / 5) - 2.0;
+        vec2 tent = 1.0 - abs(at) / 3.0;
+        vec2 uv = (vec2(pixel) + 0.5 + 0.5 * radius * at) * view.viewport.zw;
+        sum += tent.x * tent.y * textureLod(edge_pyramid, uv, lod).yz;
+    }
+    return sum.y / sum.x;
+}
+
+vec4 visibility(Surface s)
+{
+    vec4 hard = texelFetch(hard_map, s.pixel, 0);
+    if (hard.x == 1.0 && hard.z == 0.0)
+        discard;
+    // The widest penumbra this receiver can have, then that of the edges inside.
+    float radius = clamp(hard.z * hard.w, 1.5, float(P(max_radius)));
+    float w = hard.z > 0.0 ? edge_within(s.pixel, radius) : 0.0;
+    radius = clamp(w * hard.w, 1.5, radius);
+    w = w > 0.0 ? edge_within(s.pixel, radius) : 0.0;
+    int count = w > 0.0 ? P(filter_taps) : 0;
+
+    vec2 q = light_project(s.p), texel = light_texel(shadow_map);
+    vec2 inverse_size = 1.0 / (light.rect.zw - light.rect.xy), uv = light_uv(q);
+    if (w > 0.0)
+        w = min(edge_mean(s.pixel, radius), hard.z);
+    vec2 extent = max(light.extent * w, P(min_filter) * texel);
+    ReceiverPlane plane = receiver_plane(s.p, s.n);
+    float bias = P(bias) * s.p.z * light_depth_slope(s.p.z), lit = 0.0;
+    Taps taps = taps_begin(P(filter_taps), P(smooth) ? frame_shift(s.pixel) : vec2(0.5));
+    for (int i = 0; i < count; i++) {
+        vec2 offset = taps_next(taps) * extent;
+        float d = texture(shadow_map, uv + offset * inverse_size).r;
+        lit += plane_depth(plane, offset, bias) <= d ? 1.0 : 0.0;
+    }
+    float v = count > 0 ? lit / float(count) : max(hard.x, 0.0);
+#ifdef INTERLEAVED
+    return vec4(v, count > 0 ? 2.0 * w * hard.w : 0.0, 0.0, 1.0);
+#else
+    return scalar_visibility(v);
+#endif
+}

@@ -1,0 +1,48 @@
+#include "renderer/passes/penumbra.h"
+
+struct screen_space {
+    uint32_t map_size;
+    float bias;
+    uint32_t search_taps;
+    float min_filter;
+    uint32_t filter_taps;
+    float sigma;
+    uint32_t max_radius;
+    float depth_sigma;
+    uint32_t normal_power;
+};
+
+static const struct pen_param rows[] = {
+    MAP_SIZE_ROW(struct screen_space, 2048),
+    BIAS_ROW(struct screen_space),
+    PENUMBRA_ROWS(struct screen_space, 16),
+    PARAM(struct screen_space, filter_taps, .def = 12, .min = 1, .max = 64,
+        .help = "Most taps to each side of a pixel, in each of the two passes."),
+    PARAM(struct screen_space, sigma, .def = 1, .min = 0, .max = 4,
+        .help = "Width of the filter over that of the penumbra."),
+    FILTER_ROWS(struct screen_space),
+};
+
+static bool record(struct technique_run *run, struct pen_error *error)
+{
+    const struct screen_space *params = run->params;
+    return pass_penumbra_spread(run, params->map_size, error) &&
+           pass_penumbra_gauss(run, PENUMBRA_HARD, error);
+}
+
+const struct technique technique_screen_space = {
+    .info = {.name = "screen-space",
+        .title = "Screen-space blurred shadows",
+        .summary = "Hard shadows on the screen, blurred by a separable Gaussian as wide as the "
+                   "penumbra of each pixel, over the pixel's own surface.",
+        .citation = "J. Gumbau, M. Chover, M. Sbert, Screen space soft shadows, GPU Pro, 2010; "
+                    "M. MohammadBagher, J. Kautz, N. Holzschuch, C. Soler, Screen-space "
+                    "percentage-closer soft shadows, SIGGRAPH 2010 posters",
+        .artefacts = "Shadow edges off the screen or behind an object are missing from the blur, "
+                     "so penumbrae end at silhouettes; the light is a Gaussian.",
+        .cost_class = PEN_COST_MEDIUM,
+        .textured = false,
+        .struct_size = sizeof(struct screen_space),
+        .params = {rows, sizeof rows / sizeof *rows}},
+    .record = record,
+};

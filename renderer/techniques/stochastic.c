@@ -1,0 +1,55 @@
+#include "renderer/passes/light_samples.h"
+
+struct stochastic {
+    uint32_t samples;
+    uint32_t maps;
+    uint32_t map_size;
+    float bias;
+    uint32_t search_taps;
+    float min_filter;
+    uint32_t levels;
+    float blur;
+    uint32_t max_radius;
+    float depth_sigma;
+    uint32_t normal_power;
+};
+
+static const struct pen_param rows[] = {
+    PARAM(struct stochastic, samples, .def = 4, .min = 1, .max = 16, .specialise = 1,
+        .help = "Light samples per pixel and frame."),
+    PARAM(struct stochastic, maps, .def = 32, .min = 1, .max = LIGHT_SAMPLES_MOST,
+        .help = "Shadow maps, each from a point of the light, that pixels choose from."),
+    MAP_SIZE_ROW(struct stochastic, 1024),
+    BIAS_ROW(struct stochastic),
+    PENUMBRA_ROWS(struct stochastic, 12),
+    PARAM(struct stochastic, levels, .def = 2, .min = 0, .max = 6,
+        .help = "Levels of the a-trous filter; each doubles its reach."),
+    PARAM(struct stochastic, blur, .def = 0.5, .min = 0, .max = 4,
+        .help = "Width of the filter over that of the penumbra."),
+    FILTER_ROWS(struct stochastic),
+};
+
+static bool record(struct technique_run *run, struct pen_error *error)
+{
+    const struct stochastic *params = run->params;
+    return pass_penumbra_spread(run, params->map_size, error) &&
+           pass_light_samples(run, params->maps, params->map_size, params->samples, error) &&
+           pass_penumbra_atrous(run, params->levels, error);
+}
+
+const struct technique technique_stochastic = {
+    .info = {.name = "stochastic",
+        .title = "Stochastic light samples with denoising",
+        .summary = "A few light samples per pixel, different ones in neighbouring pixels, and an "
+                   "edge-avoiding filter bounded by the width of the penumbra.",
+        .citation = "S. Mehta, B. Wang, R. Ramamoorthi, Axis-aligned filtering for interactive "
+                    "sampled soft shadows, ACM TOG 31(6), 2012; H. Dammertz, D. Sewtz, J. Hanika, "
+                    "H. Lensch, Edge-avoiding a-trous wavelet transform, HPG 2010",
+        .artefacts = "Grain in narrow penumbrae and on small features; antialiasing frames use "
+                     "other samples and average it out.",
+        .cost_class = PEN_COST_MEDIUM,
+        .textured = true,
+        .struct_size = sizeof(struct stochastic),
+        .params = {rows, sizeof rows / sizeof *rows}},
+    .record = record,
+};

@@ -1,0 +1,130 @@
+/* Settings from flags and variables, the Accept header, tokens, and the quarantine. */
+#include "protocol/request.h"
+#include "server/accept.h"
+#include "server/auth.h"
+#include "server/config.h"
+#include "server/quarantine.h"
+#include "tests/unit/check.h"
+#include <unistd.h>
+
+static bool read_flags(struct config *config, const char *a, const char *b, const char *c)
+{
+    char *argv[] = {"penumbrad", (char *)a, (char *)b, (char *)c, NULL};
+    int argc = 1;
+    while (argv[argc])
+        argc++;
+    struct pen_error error = {0};
+    bool ok = config_read(config, argc, argv, &error);
+    CHECK(ok == (error.code == PEN_OK));
+    return ok;
+}
+
+static void test_config(void)
+{
+    static struct config c;
+    CHECK(read_flags(&c, NULL, NULL, NULL));
+    CHECK_STR(c.listen, "127.0.0.1:8080");
+    CHECK(
+        c.queue_limit == 64 && c.gpu_memory.bytes == 1u << 30 && !c.require_gpu.on && c.warm_up.on);
+    CHECK(read_flags(&c, "--queue-limit=9", "--require-gpu", "--gpu-memory=3G"));
+    CHECK(c.queue_limit == 9 && c.require_gpu.on && c.gpu_memory.bytes == 3ull << 30);
+    CHECK(read_flags(&c, "--store", "x=y", "--require-gpu=off"));
+    CHECK_STR(c.store, "x=y");
+    setenv("PENUMBRA_QUEUE_LIMIT", "11", 1);
+    setenv("PENUMBRA_REQUIRE_GPU", "on", 1);
+    CHECK(read_flags(&c, "--require-gpu=off", NULL, NULL));
+    CHECK(c.queue_limit == 11 && !c.require_gpu.on); /* the command line wins */
+    setenv("PENUMBRA_QUEUE_LIMIT", "eleven", 1);
+    CHECK(!read_flags(&c, NULL, NULL, NULL));
+    unsetenv("PENUMBRA_QUEUE_LIMIT");
+    unsetenv("PENUMBRA_REQUIRE_GPU");
+    static const char *const bad[] = {"--queue-limit=0", "--queue-limit=65537",
+        "--queue-limit=", "--queue-limit=-1", "--queue-limit= 1", "--queue-limit=1K",
+        "--queue-limit", "--gpu-memory=1T", "--gpu-memory=18446744073709551615G",
+        "--gpu-memory=1GB", "--device=gpus", "--queue_limit=1", "--", "store", "--tls-cert=x",
+        "--require-gpu=perhaps", "--queue-limit=99999999999999999999"};
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
+        CHECK(!read_flags(&c, bad[i], NULL, NULL));
+}
+
+static void test_accept(void)
+{
+    static const struct {
+        const char *accept, *type;
+        bool allowed;
+    } rows[] = {{NULL, "image/png", true}, {"*/*", "image/png", true},
+        {"image/*", "image/webp", true}, {"image/png", "image/webp", false},
+        {"text/html, image/webp ;q=0.5", "image/webp", true},
+        {"image/*, image/png;q=0", "image/png", false}, {"*/*;q=0.1, image/exr", "image/png", true},
+        {"IMAGE/PNG", "image/png", true}, {"image/pngx", "image/png", false},
+        {"", "image/png", false}, {"image/png;level=1;q=0", "image/png", false},
+        {",,,image/png", "image/png", true}};
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++)
+        CHECK(accept_allows(rows[i].accept, rows[i].type) == rows[i].allowed);
+    CHECK(accept_record("application/json"));
+    CHECK(accept_record("application/json, */*;q=0.5"));
+    CHECK(!accept_record("*/*"));
+    CHECK(!accept_record(NULL));
+    CHECK(!accept_record("image/png, application/json;q=0.5"));
+}
+
+static void test_auth(void)
+{
+    char path[] = "/tmp/penumbra-tokens-XXXXXX";
+    int fd = mkstemp(path);
+    static const char text[] =
+        "# comment\n\nfirst-token-0123456789\nbob  second-token-0123456789  \n";
+    CHECK(write(fd, text, sizeof text - 1) == sizeof text - 1);
+    struct auth *auth = auth_load(path, NULL);
+    CHECK(auth_check(auth, "Bearer first-token-0123456789") == 1);
+    CHECK(auth_check(auth, "bearer  second-token-0123456789") == 2);
+    CHECK(auth_check(auth, "Bearer bob") == 0);
+    CHECK(auth_check(auth, "Bearer first-token-012345678") == 0);
+    CHECK(auth_check(auth, "Bearer first-token-01234567890") == 0);
+    CHECK(auth_check(auth, "Bearer ") == 0);
+    CHECK(auth_check(auth, "first-token-0123456789") == 0);
+    CHECK(auth_check(auth, NULL) == 0);
+    auth_destroy(auth);
+    struct pen_error error = {0};
+    CHECK(ftruncate(fd, 4) == 0);
+    CHECK(!auth_load(path, &error) && error.code == PEN_UNPROCESSABLE);
+    CHECK(pwrite(fd, "short\n", 6, 0) == 6);
+    CHECK(!auth_load(path, NULL));
+    unlink(path);
+    error.code = 0;
+    CHECK(!auth_load(path, &error) && error.code == PEN_UNAVAILABLE);
+    close(fd);
+}
+
+static void test_quarantine(void)
+{
+    struct quarantine *q = quarantine_create(100);
+    uint8_t a[PEN_ID_BYTES] = {1}, b[PEN_ID_BYTES] = {2};
+    CHECK(!quarantine_blame(q, a));
+    CHECK(quarantine_remaining_s(q, a) == 0);
+    CHECK(!quarantine_blame(q, b));
+    CHECK(quarantine_blame(q, a));
+    CHECK(quarantine_remaining_s(q, a) >= 99 && quarantine_remaining_s(q, a) <= 100);
+    CHECK(quarantine_remaining_s(q, b) == 0);
+    CHECK(quarantine_count(q) == 1);
+    for (uint8_t i = 0; i < 200; i++) { /* more suspects than there is room for */
+        uint8_t other[PEN_ID_BYTES] = {3, i};
+        CHECK(!quarantine_blame(q, other));
+    }
+    CHECK(quarantine_count(q) <= 1);
+    quarantine_destroy(q);
+    q = quarantine_create(0); /* never holds anything back */
+    quarantine_blame(q, a);
+    quarantine_blame(q, a);
+    CHECK(quarantine_remaining_s(q, a) == 0);
+    quarantine_destroy(q);
+}
+
+int main(void)
+{
+    test_config();
+    test_accept();
+    test_auth();
+    test_quarantine();
+    CHECK_DONE();
+}

@@ -69,6 +69,12 @@ class Plan:
         return results[0], {group["group"]: group for group in results[1:]}
 
 
+def failures(groups):
+    """Variants whose method exists but which did not render: the plan or the method is broken."""
+    return ["%s, %s: %s" % (group["group"], v["name"], v.get("message", ""))
+            for group in groups.values() for v in group["variants"] if v["status"] == "failed"]
+
+
 def read_results(path):
     with open(path) as file:
         results = [json.loads(line) for line in file]

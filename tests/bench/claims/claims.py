@@ -6,6 +6,7 @@ claims.py --build DIR --out DIR [--quick | --tiny] [--only claims|methods|report
 import argparse
 import json
 import os
+import sys
 
 import bench
 import claims_table
@@ -98,6 +99,9 @@ def main():
         for entry in paper["claims"]:
             print("%-12s %-18s %s" % (paper["key"], entry["key"], entry["verdict"]))
     print(os.path.join(args.out, "index.html"))
+    failed = bench.failures(groups) + bench.failures(methods)
+    if failed:
+        sys.exit("failed: " + "; ".join(failed))
 
 
 if __name__ == "__main__":

@@ -6,6 +6,7 @@ compare_methods.py --build DIR --out DIR [--quick | --tiny] [--scenes a,b] [--te
 import argparse
 import json
 import os
+import sys
 
 import bench
 import scenes as scenes_module
@@ -36,7 +37,7 @@ def plan_methods(plan, scenes, techniques, size, samples, repetitions, seconds, 
         # The bunny has the light of its published timings, the others the automatic one.
         light = "&" + scenes_module.light(scene) if scene.startswith("bunny") else ""
         plan.group("methods-" + scene.replace("@", "-"), scene, variants,
-                   "width=%d&height=%d%s" % (width, height, light), repetitions, seconds, "fkp")
+                   "width=%d&height=%d%s" % (width, height, light), repetitions, seconds, "fkp" if repetitions > 1 else "fp")
 
 
 def table_rows(group):
@@ -133,7 +134,7 @@ def run(args):
         bench.import_scenes(args.build, folder)
     scenes = args.scenes.split(",") if args.scenes else SCENES
     if args.tiny:
-        scenes = ("half-plane", "stacked")
+        scenes = ("half-plane",)
     names = registered(args.build, args.device)
     if args.techniques:
         names = [name for name in names if name in args.techniques.split(",")]
@@ -152,8 +153,11 @@ def main():
     parser.add_argument("--scenes", help="names, joined by commas")
     parser.add_argument("--techniques", help="names, joined by commas")
     args = parser.parse_args()
-    run(args)
+    _, groups = run(args)
     print(os.path.join(args.out, "methods.md"))
+    failed = bench.failures(groups)
+    if failed:
+        sys.exit("failed: " + "; ".join(failed))
 
 
 if __name__ == "__main__":

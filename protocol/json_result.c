@@ -91,6 +91,7 @@ char *pen_result_json(const struct pen_result *result, const struct pen_record_e
     pen_json_end(&json);
     pen_json_uint(&json, "triangles_drawn", result->triangles_drawn);
     pen_json_uint(&json, "rays", result->rays);
+    pen_json_uint(&json, "shadow_maps", result->shadow_maps);
     pen_json_uint(&json, "gpu_bytes", result->gpu_bytes);
     pen_json_end(&json);
     return pen_json_finish(&json, NULL);

@@ -49,13 +49,15 @@ struct pen_result {
     uint32_t shadow_inputs_reused;
     uint32_t class_pixels[3];  /* lit, penumbra, umbra; all 0 when not classified */
     uint32_t full_work_pixels; /* pixels for which the method ran in full */
-    /* Receivers whose filter was split 0, 1, 2 times, summed over lights and jittered frames; all 0
-     * for methods that split nothing. */
+    /* Receivers whose filter was split 0, 1, 2 times, summed over lights and jittered frames,
+     * without those that the classifier decided; all 0 for methods that split nothing. */
     uint32_t subdivided_pixels[3];
     uint32_t triangles_drawn;
-    uint64_t rays;                    /* of methods that trace */
-    uint64_t gpu_bytes;               /* resident scenes, images and shadow inputs */
-    uint64_t image_bytes;             /* encoded size */
+    uint32_t shadow_maps; /* depth maps of light samples that the image rests on, drawn or kept;
+                             summed over lights and jittered frames */
+    uint64_t rays;        /* of methods that trace */
+    uint64_t gpu_bytes;   /* resident scenes, images and shadow inputs */
+    uint64_t image_bytes; /* encoded size */
     struct pen_comparison comparison; /* all 0 unless a reference was given */
 };
 void pen_result_warn(struct pen_result *result, const char *format, ...)

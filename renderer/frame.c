@@ -142,9 +142,8 @@ static bool resolve_emissions(struct frame *f, struct pen_error *error)
         const struct pen_light *source = f->lights[i].source;
         if (source->texture == PEN_TEXTURE_NONE)
             continue;
-        const struct scene *image = source->texture == PEN_TEXTURE_IMAGE
-            ? job->find_image(job->owner, source)
-            : NULL;
+        const struct scene *image =
+            source->texture == PEN_TEXTURE_IMAGE ? job->find_image(job->owner, source) : NULL;
         f->emissions[i] =
             emission_cache_get(job->emissions, source, image, job->request->time_s, error);
         if (!f->emissions[i])

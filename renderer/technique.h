@@ -32,15 +32,15 @@ struct technique_ctx {
     struct gl_texture sample_scratch; /* of passes/sample_maps.c */
     struct gl_texture sum;            /* RGBA32F accumulator of methods that add passes */
     GLuint sum_framebuffer;
-    struct gl_texture scratch[12];    /* of passes/scratch.c */
-    uint64_t shadow_budget; /* bytes that one method's kept inputs should stay under */
+    struct gl_texture scratch[12]; /* of passes/scratch.c */
+    uint64_t shadow_budget;        /* bytes that one method's kept inputs should stay under */
 };
 
 struct gbuffer {
-    struct gl_texture depth;   /* D32F, reversed, 0: background */
-    struct gl_texture normal;  /* RGBA16: octahedral geometric normal, octahedral shading normal */
-    struct gl_texture albedo;  /* RGBA8: square root of albedo, flags */
-    struct gl_texture surface; /* RGBA8: roughness, metallic, occlusion, specular scale */
+    struct gl_texture depth;    /* D32F, reversed, 0: background */
+    struct gl_texture normal;   /* RGBA16: octahedral geometric normal, octahedral shading normal */
+    struct gl_texture albedo;   /* RGBA8: square root of albedo, flags */
+    struct gl_texture surface;  /* RGBA8: roughness, metallic, occlusion, specular scale */
     struct gl_texture emission; /* R11G11B10F; only when the scene has any */
     GLuint framebuffer;
 };

@@ -41,8 +41,8 @@ bool pass_fill_umbra(struct technique_run *run, const struct gl_texture *tiles, 
     return true;
 }
 
-const struct gl_texture *pass_classify(struct technique_run *run,
-    const struct shadow_input *casters, float margin_texels, struct pen_error *error)
+static const struct gl_texture *classify(struct technique_run *run,
+    const struct shadow_input *casters, float margin_texels, bool umbra, struct pen_error *error)
 {
     struct technique_ctx *ctx = run->ctx;
     struct gl_texture *tiles = &ctx->tiles;
@@ -56,7 +56,7 @@ const struct gl_texture *pass_classify(struct technique_run *run,
     /* Spheres' far sides and textured lights need no zero tiles of their own: 0 is 0 in any colour;
      * but an omnidirectional light lights what lies behind its plane. */
     struct classify_block block = {
-        .margin = {margin_texels + 1}, .tile = {CLASSIFY_TILE, run->face->omni ? 0 : 1}};
+        .margin = {margin_texels + 1}, .tile = {CLASSIFY_TILE, umbra && !run->face->omni ? 1 : 0}};
     struct pass_texture textures[] = {{UNIT_DEPTH, run->gbuffer->depth.name, GL_SAMPLE_NEAREST},
         {UNIT_MIN_MAX, casters->textures[0].name, GL_SAMPLE_NEAREST}};
     if (!pass_fill(ctx,
@@ -75,4 +75,16 @@ const struct gl_texture *pass_classify(struct technique_run *run,
         return NULL;
     count_classes(run, tiles);
     return tiles;
+}
+
+const struct gl_texture *pass_classify(struct technique_run *run,
+    const struct shadow_input *casters, float margin_texels, struct pen_error *error)
+{
+    return classify(run, casters, margin_texels, true, error);
+}
+
+const struct gl_texture *pass_classify_lit(struct technique_run *run,
+    const struct shadow_input *casters, float margin_texels, struct pen_error *error)
+{
+    return classify(run, casters, margin_texels, false, error);
 }

@@ -14,6 +14,11 @@ enum tile_class { TILE_LIT, TILE_UNDECIDED, TILE_UMBRA, TILE_EMPTY };
 const struct gl_texture *pass_classify(struct technique_run *run,
     const struct shadow_input *casters, float margin_texels, struct pen_error *error);
 
+/* The same without umbra: for methods that look from other points of the emitter, which may see
+ * between casters that hide each other from its centre. */
+const struct gl_texture *pass_classify_lit(struct technique_run *run,
+    const struct shadow_input *casters, float margin_texels, struct pen_error *error);
+
 /* Writes 0 to the umbra tiles of another target, such as a method's scratch. */
 bool pass_fill_umbra(struct technique_run *run, const struct gl_texture *tiles, GLuint framebuffer,
     struct pen_error *error);

@@ -81,7 +81,7 @@ static bool build(struct technique_run *run, const struct shadow_key *key,
         .format = key->extra[1],
         .weighted = key->extra[2]};
     memcpy(&desc.offset, &key->extra[3], 4);
-    const struct shadow_input *map = pass_depth_map(run, desc.size, error);
+    const struct shadow_input *map = pass_caster_map(run, desc.size, error);
     if (!map)
         return false;
     uint32_t layers = (desc.terms + 1) / 2;

@@ -10,17 +10,25 @@ static GLuint program(struct technique_ctx *ctx, const char *defines, struct pen
     return gl_programs_get(ctx->programs, &desc, error);
 }
 
-bool pass_draw_casters(struct technique_run *run, GLuint framebuffer, uint32_t size,
-    const float sample[2], const float rect[4], bool backdrops, struct pen_error *error)
+/* layer_before: a depth texture that the drawn surfaces must lie behind, or 0. */
+static bool draw(struct technique_run *run, GLuint framebuffer, uint32_t size,
+    const float sample[2], const float rect[4], bool backdrops, GLuint layer_before,
+    struct pen_error *error)
 {
     /* Light space looks along +z, which mirrors the image: front faces come out clockwise. */
     struct scene_pass pass = {.front_is_clockwise = true};
-    pass.opaque = program(run->ctx, NULL, error);
-    pass.textured = program(run->ctx, "#define ALPHA\n", error);
+    pass.opaque = program(run->ctx, layer_before ? "#define PEEL\n" : NULL, error);
+    pass.textured = program(
+        run->ctx, layer_before ? "#define PEEL\n#define ALPHA\n" : "#define ALPHA\n", error);
     if (!pass.opaque || !pass.textured)
         return false;
     struct cull_view cull;
     light_face_cull(run->face, sample, rect, &cull);
+    if (layer_before) {
+        /* Behind the first layer the far sides count too: they close the casters. */
+        cull.cull_back = false;
+        gl.BindTextureUnit(UNIT_FREE, layer_before);
+    }
     GLuint programs[] = {pass.opaque, pass.textured};
     for (int i = 0; i < 2; i++)
         gl.ProgramUniformMatrix4fv(programs[i], gl.GetUniformLocation(programs[i], "to_clip"), 1,
@@ -53,6 +61,19 @@ bool pass_draw_casters(struct technique_run *run, GLuint framebuffer, uint32_t s
     gl.Disable(GL_DEPTH_TEST);
     gl.ClipControl(GL_UPPER_LEFT, GL_ZERO_TO_ONE);
     return true;
+}
+
+bool pass_draw_casters(struct technique_run *run, GLuint framebuffer, uint32_t size,
+    const float sample[2], const float rect[4], bool backdrops, struct pen_error *error)
+{
+    return draw(run, framebuffer, size, sample, rect, backdrops, 0, error);
+}
+
+bool pass_draw_casters_behind(struct technique_run *run, GLuint framebuffer, uint32_t size,
+    GLuint layer_before, struct pen_error *error)
+{
+    static const float center[2] = {0, 0};
+    return draw(run, framebuffer, size, center, run->face->rect, false, layer_before, error);
 }
 
 static bool build_depth(struct technique_run *run, const struct shadow_key *key,

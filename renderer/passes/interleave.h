@@ -8,3 +8,6 @@
  * contacts stay sharp. Only for methods with a scalar visibility. */
 bool pass_interleaved(
     struct technique_run *run, const struct pass_screen *pass, struct pen_error *error);
+/* The same for coloured visibility: the first pass returns interleave_colour(T and V, width). */
+bool pass_interleaved_colour(
+    struct technique_run *run, const struct pass_screen *pass, struct pen_error *error);

@@ -6,8 +6,9 @@
 
 #define LIGHT_SAMPLES_MOST 64
 
-/* Adds this face's receivers to SCRATCH_LIT and, under a textured light, SCRATCH_ALL; its first
- * face clears them. `maps` points of the light are used, at most LIGHT_SAMPLES_MOST; all of them by
- * every pixel, or, when `sparse`, P(samples) of them, different ones than its neighbours take. */
-bool pass_light_samples(struct technique_run *run, uint32_t maps, uint32_t map_size, bool sparse,
-    struct pen_error *error);
+/* Fills SCRATCH_LIT and, under a textured light, SCRATCH_ALL for this face's receivers; wants
+ * pass_penumbra_spread first. `maps` points of the light are used, at most LIGHT_SAMPLES_MOST, of
+ * which every pixel takes `per_pixel`: all of them, or, when fewer, P(samples) others than its
+ * neighbours. */
+bool pass_light_samples(struct technique_run *run, uint32_t maps, uint32_t map_size,
+    uint32_t per_pixel, struct pen_error *error);

@@ -45,6 +45,10 @@ struct pass_fill {
 };
 bool pass_fill(struct technique_ctx *ctx, const struct pass_fill *pass, struct pen_error *error);
 
+/* The accumulator ctx->sum (RGBA32F, the size of the picture), cleared to 0: the framebuffer of
+ * passes that add. */
+GLuint pass_clear_sum(struct technique_run *run);
+
 /* Draws the tiles of one class (enum tile_class) of an image of width x height pixels. */
 void pass_draw_tiles(struct technique_ctx *ctx, GLuint program, GLuint framebuffer,
     const struct gl_texture *tiles, int32_t tile_class, uint32_t width, uint32_t height, bool add);
@@ -62,6 +66,11 @@ const struct shadow_input *pass_caster_map(
 /* Draws the casters seen from `sample` through `rect` into a D32F framebuffer (cleared here). */
 bool pass_draw_casters(struct technique_run *run, GLuint framebuffer, uint32_t size,
     const float sample[2], const float rect[4], bool backdrops, struct pen_error *error);
+
+/* Depth peeling, one layer: what of the casters lies behind the 2D depth texture `layer_before` of
+ * the same size, far sides included, seen from the light's centre. */
+bool pass_draw_casters_behind(struct technique_run *run, GLuint framebuffer, uint32_t size,
+    GLuint layer_before, struct pen_error *error);
 
 /* Min and max of linear z (metres from the light's plane; texels where nothing is: 1e30) over 2^k x
  * 2^k texels: RG32F with the whole mip chain in textures[0]; level 0 has half the map's side. */

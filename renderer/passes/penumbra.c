@@ -1,23 +1,21 @@
 #include "renderer/passes/penumbra.h"
 #include <stdio.h>
 
-bool pass_penumbra_spread(
-    struct technique_run *run, uint32_t map_size, bool or_nearest, struct pen_error *error)
+bool pass_penumbra_spread(struct technique_run *run, uint32_t map_size, struct pen_error *error)
 {
-    static const float none[4] = {-1, 0, 0, 0};
+    static const float lit[4] = {1}; /* nothing to filter */
     const struct shadow_input *map = pass_caster_map(run, map_size, error);
     const struct shadow_input *min_max = map ? pass_caster_min_max(run, map_size, error) : NULL;
     if (!min_max)
         return false;
     const struct gl_texture *spread = pass_scratch(run, SCRATCH_SPREAD, GL_RGBA16F, 1);
     if (pass_is_first_face(run))
-        pass_scratch_clear(spread, none);
+        pass_scratch_clear(spread, lit);
     GLuint framebuffer = gl_framebuffer_create(&spread, 1, NULL);
     struct pass_texture pyramid = {UNIT_MIN_MAX, min_max->textures[0].name, GL_SAMPLE_NEAREST};
     bool ok = pass_screen(run,
         &(struct pass_screen){.name = "penumbra size",
             .body = "penumbra_estimate.glsl",
-            .defines = or_nearest ? "#define OR_NEAREST\n" : NULL,
             .shadow = &map->textures[0],
             .textures = &pyramid,
             .texture_count = 1,
@@ -41,13 +39,21 @@ static bool is_textured(const struct technique_run *run)
     return run->face->textured && run->technique->info.textured;
 }
 
-static GLuint make_target(struct technique_run *run, const struct step *step)
+void pass_penumbra_start(struct technique_run *run, bool next)
 {
-    GLenum format = is_textured(run) ? GL_RGBA16F : GL_RG16F;
-    const struct gl_texture *targets[2] = {
-        pass_scratch(run, step->from_next ? SCRATCH_LIT : SCRATCH_LIT_NEXT, format, 1)};
-    if (is_textured(run))
-        targets[1] = pass_scratch(run, step->from_next ? SCRATCH_ALL : SCRATCH_ALL_NEXT, format, 1);
+    bool textured = is_textured(run);
+    const float *mean = run->face->emission_mean;
+    const float lit[4] = {
+        textured ? mean[0] : 1, textured ? mean[1] : 1, textured ? mean[2] : 1, 1};
+    int slot = next ? SCRATCH_LIT_NEXT : SCRATCH_LIT;
+    for (int i = 0; i < (textured ? 2 : 1); i++)
+        pass_scratch_clear(pass_scratch(run, slot + i, textured ? GL_RGBA16F : GL_RG16F, 1), lit);
+}
+
+static GLuint make_target(struct technique_run *run, bool next)
+{
+    struct gl_texture *first = &run->ctx->scratch[next ? SCRATCH_LIT_NEXT : SCRATCH_LIT];
+    const struct gl_texture *targets[2] = {first, first + 1};
     return gl_framebuffer_create(targets, is_textured(run) ? 2 : 1, NULL);
 }
 
@@ -58,7 +64,11 @@ static bool filter(struct technique_run *run, const struct step *step, struct pe
     bool hard = step->source == PENUMBRA_HARD;
     snprintf(defines, sizeof defines, "%s%s%s%s", step->defines, step->last ? "#define LAST\n" : "",
         hard ? "#define FROM_HARD\n" : "", is_textured(run) ? "#define TEXTURED\n" : "");
-    GLuint framebuffer = step->last ? 0 : make_target(run, step);
+    GLuint framebuffer = 0;
+    if (!step->last) {
+        pass_penumbra_start(run, !step->from_next);
+        framebuffer = make_target(run, !step->from_next);
+    }
     int base = step->from_next ? SCRATCH_LIT_NEXT : SCRATCH_LIT;
     struct pass_texture textures[] = {{UNIT_DEPTH, run->gbuffer->depth.name, GL_SAMPLE_NEAREST},
         {UNIT_NORMAL, run->gbuffer->normal.name, GL_SAMPLE_NEAREST},

@@ -20,11 +20,10 @@
         PARAM(aggregate, normal_power, .def = 32, .min = 1, .max = 256,                            \
             .help = "Sharpness of the filter's preference for equal normals.")
 
-/* Writes SCRATCH_SPREAD, RGBA16F, for this face's receivers: hard visibility (elsewhere -1), then
- * the Gaussian of screen_spread in penumbra.glsl, px. A receiver that all of the light is behind:
- * zeros. `or_nearest`: blockers that the search's taps miss still give a width. */
-bool pass_penumbra_spread(
-    struct technique_run *run, uint32_t map_size, bool or_nearest, struct pen_error *error);
+/* Writes SCRATCH_SPREAD, RGBA16F, for this face's receivers: hard visibility, then the Gaussian of
+ * screen_spread in penumbra.glsl, px. (1, 0, 0, 0): proved to be lit, or no receiver at all; all
+ * zeros: a receiver that all of the light is behind. */
+bool pass_penumbra_spread(struct technique_run *run, uint32_t map_size, struct pen_error *error);
 
 enum penumbra_source { PENUMBRA_HARD, PENUMBRA_SAMPLES };
 
@@ -34,5 +33,8 @@ enum penumbra_source { PENUMBRA_HARD, PENUMBRA_SAMPLES };
 bool pass_penumbra_gauss(
     struct technique_run *run, enum penumbra_source source, struct pen_error *error);
 
-/* The same by `levels` of an a-trous transform; levels 0: unfiltered. */
+/* Makes SCRATCH_LIT (SCRATCH_ALL), or their successors, fit this light and start as lit pixels. */
+void pass_penumbra_start(struct technique_run *run, bool next);
+
+/* As pass_penumbra_gauss, by `levels` of an a-trous transform; levels 0: unfiltered. */
 bool pass_penumbra_atrous(struct technique_run *run, uint32_t levels, struct pen_error *error);

@@ -120,3 +120,17 @@ bool pass_fill(struct technique_ctx *ctx, const struct pass_fill *pass, struct p
     gl_timer_end(&ctx->timer);
     return true;
 }
+
+GLuint pass_clear_sum(struct technique_run *run)
+{
+    static const float zero[4] = {0};
+    struct technique_ctx *ctx = run->ctx;
+    if (gl_texture_fit(&ctx->sum, GL_RGBA32F, run->width, run->height, 0, 1) ||
+        !ctx->sum_framebuffer) {
+        gl.DeleteFramebuffers(1, &ctx->sum_framebuffer);
+        const struct gl_texture *color = &ctx->sum;
+        ctx->sum_framebuffer = gl_framebuffer_create(&color, 1, NULL);
+    }
+    gl.ClearNamedFramebufferfv(ctx->sum_framebuffer, GL_COLOR, 0, zero);
+    return ctx->sum_framebuffer;
+}

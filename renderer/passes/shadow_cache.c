@@ -97,6 +97,11 @@ const struct shadow_input *shadow_cache_get(struct technique_run *run, const str
     return &e->input;
 }
 
+void shadow_cache_mark_built(struct shadow_cache *cache)
+{
+    cache->built++;
+}
+
 uint64_t shadow_cache_bytes(const struct shadow_cache *cache)
 {
     return cache->bytes;

@@ -28,6 +28,9 @@ typedef bool (*shadow_build)(struct technique_run *run, const struct shadow_key 
 const struct shadow_input *shadow_cache_get(struct technique_run *run, const struct shadow_key *key,
     shadow_build build, struct pen_error *error);
 
+/* For inputs that are filled bit by bit: something was drawn into one in this frame. */
+void shadow_cache_mark_built(struct shadow_cache *cache);
+
 uint64_t shadow_cache_bytes(const struct shadow_cache *cache);
 /* Drops the least recently used inputs of earlier frames until `bytes` or less are held. */
 void shadow_cache_trim(struct shadow_cache *cache, uint64_t bytes);

@@ -1,7 +1,7 @@
 // One level of an edge-avoiding a-trous transform (Dammertz et al. 2010): 5 x 5 taps of the cubic
 // B-spline, `step` pixels apart, bounded by the penumbra's own Gaussian (axis-aligned filtering,
 // Mehta et al. 2012), so that contacts stay sharp. Needs P(blur), P(depth_sigma), P(normal_power).
-#include "same_surface.glsl"
+#include "surface_difference.glsl"
 #include "light_ratio.glsl"
 layout(std140, binding = 3) uniform LevelBlock {
     ivec4 step; // x: pixels between taps; y: taps to each side, -1: none at all
@@ -11,7 +11,7 @@ void main()
 {
     ivec2 pixel = ivec2(gl_FragCoord.xy), last = ivec2(view.viewport.xy) - 1;
     vec4 spread = texelFetch(spread_map, pixel, 0);
-    if (spread.x < 0.0)
+    if (spread_is_lit(spread))
         discard;
     vec2 deviation = max(P(blur) * spread.yw, 0.25);
     Plane plane = plane_at(pixel);
@@ -33,8 +33,8 @@ void main()
             vec2 d = vec2(float(offset.x) - spread.z * float(offset.y), float(offset.y)) / deviation;
             vec2 spline = vec2(x == 0 ? 0.375 : abs(x) == 1 ? 0.25 : 0.0625,
                 y == 0 ? 0.375 : abs(y) == 1 ? 0.25 : 0.0625);
-            float w = inside * spline.x * spline.y * exp(-0.5 * dot(d, d)) *
-                same_surface(plane, at, offset);
+            float w = inside * spline.x * spline.y * 
+                exp(-0.5 * dot(d, d) - surface_difference(plane, at, offset));
             sum += w * ratio_at(at);
             total += w;
         }

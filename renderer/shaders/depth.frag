@@ -8,8 +8,17 @@ in vec4 v_color;
 flat in uint v_material;
 #endif
 
+#ifdef PEEL // only what lies behind the layer before
+layout(binding = 7) uniform sampler2D layer_before;
+#endif
+
 void main()
 {
+#ifdef PEEL
+    // A few units of least precision: two programs may round one surface differently.
+    if (gl_FragCoord.z <= texelFetch(layer_before, ivec2(gl_FragCoord.xy), 0).r + 4e-7)
+        discard;
+#endif
 #ifdef ALPHA
     float alpha = material_base(v_material, v_uv, v_color).a;
     float threshold = unit_float(hash3(uvec3(gl_FragCoord.xy, seed)).x);

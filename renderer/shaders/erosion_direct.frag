@@ -8,7 +8,7 @@ void main()
 {
     ivec2 pixel = ivec2(gl_FragCoord.xy);
     vec4 hard = texelFetch(hard_map, pixel, 0);
-    if (hard.x < 0.0)
+    if (hard.x == 1.0 && hard.z == 0.0)
         discard;
     vec2 to = texelFetch(seeds, pixel, 0).rg;
     float v = hard.x;

@@ -1,23 +1,21 @@
 // The hard shadow buffer of Klein et al. 2014: (lit, W of the blocker, bound of W, reach). W is F2's
 // window scale, which takes the light's extent to the map plane and so stands for blocker and
 // receiver depth in one; it is negative where the silhouette test fails. Bound: no blocker of this
-// receiver has a larger W; 0 where nothing can block or where everything does. Reach: pixels that W
-// = 1 makes of the light's half extent, at most.
+// receiver has a larger W; 0 where everything blocks. Reach: pixels that W = 1 makes of the light's
+// half extent, at most. What is proved to be lit is left as the target starts: (1, 0, 0, 0).
 #include "penumbra.glsl"
-#include "min_max.glsl"
-#include "hard_lit.glsl"
+#include "blocker_window.glsl"
 
 vec4 visibility(Surface s)
 {
     vec2 q = light_project(s.p), texel = light_texel(shadow_map);
     ReceiverPlane plane = receiver_plane(s.p, s.n);
-    float bias = P(bias) * s.p.z * light_depth_slope(s.p.z), depth, nearest_z;
+    float bias = P(bias) * s.p.z * light_depth_slope(s.p.z), depth;
+    BlockerSearch search = blocker_window(s, plane, q, texel, bias);
+    if (search.lit)
+        discard;
     bool lit = hard_lit(s, plane, q, texel, bias, depth);
-    vec2 search = min_max_search_extent(q, s.p.z, texel, nearest_z);
-    float slope = dot(abs(plane.gradient), search);
-    bool proved = light_depth(nearest_z) >= min(plane.depth + slope, 1.0) ||
-        light_depth(min_max_window(q, search).y) < min(plane.depth - slope, 1.0) - bias;
-    float bound = proved ? 0.0 : light_window_scale(min(nearest_z, s.p.z), s.p.z);
+    float bound = search.dark ? 0.0 : light_window_scale(min(search.nearest_z, s.p.z), s.p.z);
     mat2 pixels = pixels_per_map(s), map = inverse(pixels);
     // An edge of the shadow belongs to a silhouette when light passes within the pixel's footprint;
     // where an object in front merely ends, all of the footprint is blocked.

@@ -1,6 +1,7 @@
 // What screen-space filters carry per pixel: light that arrives over light that would arrive without
 // casters, as sums that are divided after filtering (the ratio estimator of Heitz et al. 2018), so
-// that filtering neither needs nor changes the light's own colour.
+// that filtering neither needs nor changes the light's own colour. Targets start as a lit pixel: 1
+// and 1.
 //   plain light:       ratio_lit.r arrived, ratio_lit.g of
 //   TEXTURED:          ratio_lit rgb and a (mean) arrived, ratio_all rgb and a of
 //   FROM_HARD:         the hard visibility of penumbra_estimate.glsl
@@ -13,6 +14,11 @@ layout(binding = 9) uniform sampler2D ratio_all;
 #endif
 #endif
 
+bool spread_is_lit(vec4 spread)
+{
+    return spread.x == 1.0 && spread.w == 0.0;
+}
+
 #ifdef TEXTURED
 #define RATIO mat2x4
 #else
@@ -22,9 +28,9 @@ layout(binding = 9) uniform sampler2D ratio_all;
 RATIO ratio_at(ivec2 pixel)
 {
 #if defined(FROM_HARD)
-    // Receivers that no light can reach, and pixels that are none, count for nothing.
-    vec4 e = texelFetch(spread_map, pixel, 0);
-    return e.w > 0.0 ? vec2(e.x, 1.0) : vec2(0.0);
+    // Receivers that no light can reach count for nothing.
+    vec2 e = texelFetch(spread_map, pixel, 0).xw;
+    return e == vec2(0.0) ? vec2(0.0) : vec2(e.x, 1.0);
 #elif defined(TEXTURED)
     return mat2x4(texelFetch(ratio_lit, pixel, 0), texelFetch(ratio_all, pixel, 0));
 #else

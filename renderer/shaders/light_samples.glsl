@@ -5,6 +5,7 @@
 #include "dither.glsl"
 #endif
 layout(binding = 7) uniform sampler2DArray maps;
+layout(binding = 8) uniform sampler2D spread_map; // see penumbra_estimate.glsl
 struct SampleMap {
     vec4 at;     // xy emitter position, zw the same in [-1, 1]^2
     vec4 window; // uv = l * xy + zw
@@ -13,7 +14,7 @@ struct SampleMap {
 layout(std140, binding = 3) uniform SampleBlock {
     SampleMap samples[16];
     ivec4 range; // samples of this batch, number of the first, samples in all
-    vec4 cell;   // x: side of the emitter's part that a sample stands for, in [-1, 1]
+    vec4 cell;   // x: side of the emitter's part that a sample stands for, in [-1, 1]; y: its weight
 } batch;
 
 // How much sample i counts, and whether the receiver sees it.
@@ -46,6 +47,9 @@ vec2 look_up(Surface s, int i, float depth, float bias)
 
 vec4 visibility(Surface s)
 {
+    vec2 spread = texelFetch(spread_map, s.pixel, 0).xw;
+    if (spread == vec2(1.0, 0.0)) // proved to be lit, as the target starts
+        discard;
     float depth = light_depth(s.p.z), bias = P(bias) * s.p.z * light_depth_slope(s.p.z);
 #ifdef SPARSE
     // The maps in order of x fall into as many strata as a pixel takes samples. Pixels of a 4 x 4
@@ -73,5 +77,5 @@ vec4 visibility(Surface s)
             ? vec4(light_emission(batch.samples[i].at.zw, batch.cell.x), 1.0) * seen.y
             : vec4(seen.yx, 0.0, 0.0);
     }
-    return sum;
+    return sum * batch.cell.y;
 }

@@ -1,5 +1,5 @@
 // Per pixel: hard visibility, and the Gaussian that stands for the light on the screen (s1, skew,
-// s2; see screen_spread), next to zero where nothing is to be filtered.
+// s2; see screen_spread). What is proved to be lit is left as the target starts: (1, 0, 0, 0).
 #include "penumbra.glsl"
 #include "blockers.glsl"
 
@@ -8,7 +8,11 @@ vec4 visibility(Surface s)
     vec2 q = light_project(s.p), texel = light_texel(shadow_map);
     ReceiverPlane plane = receiver_plane(s.p, s.n);
     float bias = P(bias) * s.p.z * light_depth_slope(s.p.z), depth;
-    vec2 extent = blocker_extent(s, plane, q, P(min_filter) * texel + 0.25 * texel, bias, vec2(0.5));
+    vec2 least = max(P(min_filter), 0.25) * texel;
+    BlockerSearch search = blocker_window(s, plane, q, least, bias);
+    if (search.lit)
+        discard;
+    vec2 extent = blocker_extent(s, plane, search, light_uv(q), least, bias);
     bool lit = hard_lit(s, plane, q, texel, bias, depth);
     vec3 spread = screen_spread(
         pixels_per_map(s), light_deviation() * extent, 0.4 * float(P(max_radius)));

@@ -1,6 +1,6 @@
 // One of the two lines of an anisotropic Gaussian (see screen_spread); SECOND: along (skew, 1).
 // Needs P(sigma), P(filter_taps), P(depth_sigma) and P(normal_power).
-#include "same_surface.glsl"
+#include "surface_difference.glsl"
 #include "light_ratio.glsl"
 #include "dither.glsl"
 
@@ -8,7 +8,7 @@ void main()
 {
     ivec2 pixel = ivec2(gl_FragCoord.xy), last = ivec2(view.viewport.xy) - 1;
     vec4 spread = texelFetch(spread_map, pixel, 0);
-    if (spread.x < 0.0)
+    if (spread_is_lit(spread))
         discard;
 #ifdef SECOND
     vec2 reach = 2.5 * P(sigma) * spread.w * vec2(spread.z, 1.0);
@@ -33,7 +33,7 @@ void main()
         ivec2 at = pixel + offset;
         float inside = all(equal(at, clamp(at, ivec2(0), last))) ? 1.0 : 0.0;
         at = clamp(at, ivec2(0), last);
-        float w = inside * exp(-3.125 * t * t) * same_surface(plane, at, offset);
+        float w = inside * exp(-3.125 * t * t - surface_difference(plane, at, offset));
         sum += w * ratio_at(at);
         total += w;
     }

@@ -1,5 +1,6 @@
+#include "renderer/passes/classify.h"
+#include "renderer/passes/interleave.h"
 #include "renderer/techniques/convolution_params.h"
-#include <string.h>
 
 static const char *const mode_names[] = {"adaptive", "fixed2", "average", NULL};
 static const char *const estimator_names[] = {"csm", "pcf", NULL};
@@ -18,6 +19,8 @@ struct adaptive {
     float min_filter;
     uint32_t pcf_search_taps;
     uint32_t pcf_taps;
+    pen_flag smooth;
+    uint32_t series_size;
     uint32_t search_taps;
     uint32_t taps;
     uint32_t terms;
@@ -28,7 +31,7 @@ struct adaptive {
 };
 
 static const struct pen_param rows[] = {
-    MAP_SIZE_ROW(struct adaptive, 1024),
+    MAP_SIZE_ROW(struct adaptive, 2048),
     BIAS_ROW(struct adaptive),
     PARAM(struct adaptive, mode, .choices = mode_names, .specialise = 1,
         .help = "Splits where it pays; always into 16 cells; never."),
@@ -47,8 +50,13 @@ static const struct pen_param rows[] = {
         .help = "Least half width of the filter."),
     PARAM(struct adaptive, pcf_search_taps, .def = 16, .min = 1, .max = 64,
         .help = "Estimator pcf: samples used to find the average blocker depth."),
-    PARAM(struct adaptive, pcf_taps, .def = 64, .min = 4, .max = 256,
+    PARAM(struct adaptive, pcf_taps, .def = 32, .min = 4, .max = 256,
         .help = "Estimator pcf: depth comparisons of the whole filter, halved by each split."),
+    PARAM(struct adaptive, smooth, .def = 1,
+        .help = "Estimator pcf: shifts the comparisons per pixel and averages 4 x 4 pixels of wide "
+                "penumbrae."),
+    PARAM(struct adaptive, series_size, .def = 1024, .min = 64, .max = 8192, .unit = "texel",
+        .help = "Estimator csm: side of the filtered maps, in place of map_size."),
     PARAM(struct adaptive, search_taps, .def = 2, .min = 1, .max = 8,
         .help = "Estimator csm: lookups per axis of the blocker average."),
     PARAM(struct adaptive, taps, .def = 4, .min = 1, .max = 8,
@@ -84,17 +92,23 @@ static bool record(struct technique_run *run, struct pen_error *error)
     gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, COUNTS_BINDING, state->counts);
     if (params->estimator == ESTIMATOR_CSM) {
         struct convolution_desc desc = CONVOLUTION_DESC(params, true);
+        desc.size = params->series_size;
         return convolution_screen(run, &desc, pass, error);
     }
-    const struct shadow_input *map = pass_depth_map(run, params->map_size, error);
-    const struct shadow_input *min_max = map ? pass_min_max(run, params->map_size, error) : NULL;
+    const struct shadow_input *map = pass_caster_map(run, params->map_size, error);
+    const struct shadow_input *min_max =
+        map ? pass_caster_min_max(run, params->map_size, error) : NULL;
     if (!min_max)
+        return false;
+    if (run->request->classify.on &&
+        !(pass.tiles = pass_classify(run, min_max, 1.5f * params->min_filter + 1, error)))
         return false;
     struct pass_texture pyramid = {UNIT_MIN_MAX, min_max->textures[0].name, GL_SAMPLE_NEAREST};
     pass.shadow = &map->textures[0];
     pass.textures = &pyramid;
     pass.texture_count = 1;
-    return pass_screen(run, &pass, error);
+    return params->smooth.on ? pass_interleaved_colour(run, &pass, error)
+                             : pass_screen(run, &pass, error);
 }
 
 static void finish(struct technique_ctx *ctx, void *state, struct pen_result *result)

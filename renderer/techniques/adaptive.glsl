@@ -5,6 +5,7 @@
 #include "window.glsl"
 #include "taps.glsl"
 #include "convolution.glsl"
+#include "interleave_colour.glsl"
 
 layout(std430, binding = 1) buffer Counts {
     uint subdivided[3];
@@ -22,12 +23,13 @@ int adaptive_window(Receiver r, vec2 extent)
     return receiver_window(r, extent);
 }
 
-float adaptive_blocker_depth(Receiver r, vec2 extent, bool wanted, float nearest_z, float receiver_z)
+float adaptive_blocker_depth(
+    Receiver r, vec2 extent, vec2 shift, bool wanted, float nearest_z, float receiver_z)
 {
     return blocker_depth(r, extent, wanted ? int(P(search_taps)) : 0, nearest_z, receiver_z);
 }
 
-float estimate(Receiver r, vec2 offset, vec2 extent, int level)
+float estimate(Receiver r, vec2 offset, vec2 extent, vec2 shift, int level)
 {
     return window_visibility(r, offset, extent, max(int(P(taps)) >> level, 1));
 }
@@ -45,12 +47,13 @@ int adaptive_window(Receiver r, vec2 extent)
 
 // Four times the taps where the first ones find nothing although the pyramid cannot prove the window
 // lit: at the outer edge of a penumbra blockers fill a small part of it.
-float adaptive_blocker_depth(Receiver r, vec2 extent, bool wanted, float nearest_z, float receiver_z)
+float adaptive_blocker_depth(
+    Receiver r, vec2 extent, vec2 shift, bool wanted, float nearest_z, float receiver_z)
 {
     float sum = 0.0, blockers = 0.0;
     for (int round = 0; round < 2; round++) {
         int count = int(P(pcf_search_taps)) << (2 * round);
-        Taps taps = taps_begin(count, vec2(0.5));
+        Taps taps = taps_begin(count, shift);
         count = wanted && blockers == 0.0 ? count : 0;
         for (int i = 0; i < count; i++) {
             vec2 offset = taps_next(taps) * extent;
@@ -64,10 +67,10 @@ float adaptive_blocker_depth(Receiver r, vec2 extent, bool wanted, float nearest
     return blockers > 0.0 ? min(sum / blockers, receiver_z) : receiver_z;
 }
 
-float estimate(Receiver r, vec2 offset, vec2 extent, int level)
+float estimate(Receiver r, vec2 offset, vec2 extent, vec2 shift, int level)
 {
     int count = max(int(P(pcf_taps)) >> level, 1);
-    Taps taps = taps_begin(count, vec2(0.5));
+    Taps taps = taps_begin(count, shift);
     float lit = 0.0;
     for (int i = 0; i < count; i++) {
         vec2 at = offset + taps_next(taps) * extent;
@@ -113,9 +116,9 @@ vec2 quarter(int i)
 }
 
 // Coloured and mean visibility of one quarter of the light, itself split where it pays.
-vec4 quarter_visibility(Receiver r, vec2 center, vec2 extent, inout uint depth)
+vec4 quarter_visibility(Receiver r, vec2 center, vec2 extent, vec2 shift, inout uint depth)
 {
-    float visible = estimate(r, center * extent, 0.5 * extent, 1);
+    float visible = estimate(r, center * extent, 0.5 * extent, shift, 1);
     vec4 emission = emission_moments(center, 1);
     vec4 whole = vec4(emission.rgb * visible, visible);
     float weight = split_weight(visible, emission);
@@ -125,7 +128,7 @@ vec4 quarter_visibility(Receiver r, vec2 center, vec2 extent, inout uint depth)
     vec4 sum = vec4(0.0);
     for (int i = 0; i < 4; i++) {
         vec2 at = center + 0.5 * quarter(i);
-        float v = estimate(r, at * extent, 0.25 * extent, 2);
+        float v = estimate(r, at * extent, 0.25 * extent, shift, 2);
         sum += vec4(emission_moments(at, 2).rgb * v, v);
     }
     return mix(whole, 0.25 * sum, weight);
@@ -134,17 +137,22 @@ vec4 quarter_visibility(Receiver r, vec2 center, vec2 extent, inout uint depth)
 vec4 visibility(Surface s)
 {
     Receiver r = adaptive_receiver(s);
+#ifdef INTERLEAVED
+    vec2 shift = frame_shift(s.pixel);
+#else
+    vec2 shift = vec2(0.5);
+#endif
     float nearest_z;
     vec2 extent = min_max_search_extent(r.q, s.p.z, r.metres, nearest_z);
     int kind = adaptive_window(r, extent);
-    float caster_z = adaptive_blocker_depth(r, extent, kind == WINDOW_MIXED, nearest_z, s.p.z);
+    float caster_z = adaptive_blocker_depth(r, extent, shift, kind == WINDOW_MIXED, nearest_z, s.p.z);
     extent = max(light_filter_extent(caster_z, s.p.z), P(min_filter) * r.metres);
     if (kind == WINDOW_MIXED)
         kind = adaptive_window(r, 1.5 * extent);
     uint depth = 0u;
     vec4 result = scalar_visibility(kind == WINDOW_BLOCKED ? 0.0 : 1.0);
     if (kind == WINDOW_MIXED) {
-        float visible = estimate(r, vec2(0.0), extent, 0);
+        float visible = estimate(r, vec2(0.0), extent, shift, 0);
         result = scalar_visibility(visible);
         // Quarters of a disk are no squares; only rectangles are textured.
         float weight = light.shape == SHAPE_DISK ? 0.0
@@ -153,10 +161,17 @@ vec4 visibility(Surface s)
             depth = 1u;
             vec4 sum = vec4(0.0);
             for (int i = 0; i < 4; i++)
-                sum += quarter_visibility(r, quarter(i), extent, depth);
+                sum += quarter_visibility(r, quarter(i), extent, shift, depth);
             result = mix(result, 0.25 * sum, weight);
         }
     }
     atomicAdd(subdivided[depth], 1u);
+#ifdef INTERLEAVED
+    // F5, for the averaging pass.
+    float scale = light.parallel != 0 ? 1.0 : s.p.z / light.near_z;
+    float pixels = 2.0 * min(extent.x, extent.y) * scale * view.eye.w * s.depth / view.forward.w;
+    return interleave_colour(result, kind == WINDOW_MIXED ? pixels : 0.0);
+#else
     return result;
+#endif
 }

@@ -58,12 +58,11 @@ Receiver series_receiver(Surface s)
     return receiver_of(s, vec2(textureSize(basis, 0).xy));
 }
 
-// What is proven of the window q +- extent. Blocked only where the series says so too: without help
-// at contacts, that is past its step, twice the offset before the receiver.
+// What is proven of the window q +- extent. Blocked only where the series says so too, past its step,
+// twice the offset before the receiver: else proven pixels stand out as spots.
 int receiver_window(Receiver r, vec2 extent)
 {
-    float margin = P(contact) ? 0.0
-                              : 2.0 * series.offset / series.range * (light.far_z - light.near_z);
+    float margin = 2.0 * series.offset / series.range * (light.far_z - light.near_z);
     return window_class(r.q, extent, r.plane, r.bias, margin, r.map_size);
 }
 
@@ -116,7 +115,8 @@ vec2 cell_center(int i, ivec2 cells, out vec2 half_cell)
 
 // Visible share behind one lookup: f rescaled so that the ripple reaches 0 and 1. With `contact`
 // also so that a cell full of its nearest caster reaches 0, even when that caster is so near to the
-// receiver that it lies on the step: the two-plane case is then exact at any distance.
+// receiver that it lies on the step: two planes are then told apart at most distances. Nearer still
+// the step is kept, or receivers that shadow themselves come out in specks.
 float cell_visibility(Receiver r, float f, float depth, vec2 offset, vec2 extent)
 {
 #ifdef RAW
@@ -124,11 +124,11 @@ float cell_visibility(Receiver r, float f, float depth, vec2 offset, vec2 extent
 #else
     float low = series.low, high = series.low + 1.0 / series.scale;
     if (P(contact)) {
-        float nearest = min_max_window(r.q + offset, extent).x;
+        float nearest = min(min_max_window(r.q + offset, extent).x, light.far_z);
         float z = (nearest - light.near_z) / (light.far_z - light.near_z) * series.range;
         float x = z - depth + series.offset;
         if (x > -series.offset)
-            low = max(low, min(series_step(x), high - 0.02));
+            low = max(low, min(series_step(x), high - 0.25));
     }
     return clamp((f - low) / (high - low), 0.0, 1.0);
 #endif

@@ -33,7 +33,8 @@ static inline bool convolution_screen(struct technique_run *run,
     const struct convolution_desc *desc, struct pass_screen pass, struct pen_error *error)
 {
     const struct shadow_input *series = pass_convolution(run, desc, error);
-    const struct shadow_input *min_max = series ? pass_min_max(run, desc->size, error) : NULL;
+    const struct shadow_input *min_max =
+        series ? pass_caster_min_max(run, desc->size, error) : NULL;
     if (!min_max)
         return false;
     struct convolution_block block = convolution_constants(desc);

@@ -41,7 +41,8 @@ const struct technique technique_cssm = {
         .citation = "T. Annen, Z. Dong, T. Mertens, P. Bekaert, H.-P. Seidel, J. Kautz, Real-time, "
                     "all-frequency shadows in dynamic scenes, ACM Trans. Graph. 27(3), 2008",
         .artefacts = "Light bleeds where casters touch receivers, over a depth of about a term's "
-                     "width; one average depth merges near and far casters; ripples at few terms.",
+                     "width, with specks where a surface shadows itself closely; one average depth "
+                     "merges near and far casters.",
         .cost_class = PEN_COST_MEDIUM,
         .textured = false,
         .struct_size = sizeof(struct cssm),

@@ -124,13 +124,13 @@ static bool build_edge_pyramid(struct technique_run *run, const struct gl_textur
 static bool record_pcf(
     struct technique_run *run, const struct shadow_input *map, struct pen_error *error)
 {
-    static const float none[4] = {-1, 0, 0, 0};
+    static const float lit[4] = {1};
     const struct erosion *params = run->params;
     const struct gl_texture *hard = pass_scratch(run, SCRATCH_HARD, GL_RGBA16F, 1);
     const struct gl_texture *pyramid = pass_scratch(run, SCRATCH_EDGES, GL_RGBA16F, 0);
     /* Each face filters its own receivers in its own map, so it needs its own edges, also those
      * that lie beyond its border. */
-    pass_scratch_clear(hard, none);
+    pass_scratch_clear(hard, lit);
     if (!write_scratch(run, SCRATCH_HARD, "erosion_hard.glsl", map, true, error) ||
         !build_edge_pyramid(run, hard, pyramid, error))
         return false;
@@ -195,11 +195,11 @@ static bool flood(
 static bool record_direct(
     struct technique_run *run, const struct shadow_input *map, struct pen_error *error)
 {
-    static const float none[4] = {-1, 0, 0, 0};
+    static const float lit[4] = {1};
     const struct gl_texture *hard = pass_scratch(run, SCRATCH_HARD, GL_RGBA16F, 1);
     const struct gl_texture *axes = pass_scratch(run, SCRATCH_AXES, GL_RGBA16F, 1);
     if (pass_is_first_face(run))
-        pass_scratch_clear(hard, none);
+        pass_scratch_clear(hard, lit);
     if (!write_scratch(run, SCRATCH_HARD, "erosion_hard.glsl", map, false, error) ||
         !write_scratch(run, SCRATCH_AXES, "erosion_axes.glsl", map, false, error))
         return false;

@@ -34,6 +34,8 @@ float edge_mean(ivec2 pixel, float radius)
 vec4 visibility(Surface s)
 {
     vec4 hard = texelFetch(hard_map, s.pixel, 0);
+    if (hard.x == 1.0 && hard.z == 0.0)
+        discard;
     // The widest penumbra this receiver can have, then that of the edges inside.
     float radius = clamp(hard.z * hard.w, 1.5, float(P(max_radius)));
     float w = hard.z > 0.0 ? edge_within(s.pixel, radius) : 0.0;

@@ -23,19 +23,6 @@ static const struct pen_param rows[] = {
     BIAS_ROW(struct multisample),
 };
 
-static void fit_sum(struct technique_run *run)
-{
-    static const float zero[4] = {0};
-    struct technique_ctx *ctx = run->ctx;
-    if (gl_texture_fit(&ctx->sum, GL_RGBA32F, run->width, run->height, 0, 1) ||
-        !ctx->sum_framebuffer) {
-        gl.DeleteFramebuffers(1, &ctx->sum_framebuffer);
-        const struct gl_texture *color = &ctx->sum;
-        ctx->sum_framebuffer = gl_framebuffer_create(&color, 1, NULL);
-    }
-    gl.ClearNamedFramebufferfv(ctx->sum_framebuffer, GL_COLOR, 0, zero);
-}
-
 struct lookup_block {
     struct sample_map samples[SAMPLE_MAP_BATCH];
     int32_t count[4];
@@ -72,14 +59,13 @@ static bool record(struct technique_run *run, struct pen_error *error)
     sample_points(run->face, params->samples, points);
     uint64_t bytes = (uint64_t)params->samples * params->map_size * params->map_size * 4;
     bool keep = bytes <= run->ctx->shadow_budget;
-    fit_sum(run);
+    pass_clear_sum(run);
     for (uint32_t first = 0; first < params->samples; first += SAMPLE_MAP_BATCH) {
         uint32_t left = params->samples - first;
         uint32_t n = left < SAMPLE_MAP_BATCH ? left : SAMPLE_MAP_BATCH;
         if (!add_batch(run, points, first, n, keep, error))
             return false;
     }
-
     struct pass_texture sum = {UNIT_FREE, run->ctx->sum.name, GL_SAMPLE_NEAREST};
     return pass_screen(run,
         &(struct pass_screen){.name = "multisample resolve",

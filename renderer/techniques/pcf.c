@@ -31,10 +31,8 @@ static bool record(struct technique_run *run, struct pen_error *error)
             return false;
     }
     return pass_screen(run,
-        &(struct pass_screen){.name = "pcf",
-            .body = "pcf.glsl",
-            .shadow = &map->textures[0],
-            .tiles = tiles},
+        &(struct pass_screen){
+            .name = "pcf", .body = "pcf.glsl", .shadow = &map->textures[0], .tiles = tiles},
         error);
 }
 

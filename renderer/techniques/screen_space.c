@@ -26,7 +26,7 @@ static const struct pen_param rows[] = {
 static bool record(struct technique_run *run, struct pen_error *error)
 {
     const struct screen_space *params = run->params;
-    return pass_penumbra_spread(run, params->map_size, true, error) &&
+    return pass_penumbra_spread(run, params->map_size, error) &&
            pass_penumbra_gauss(run, PENUMBRA_HARD, error);
 }
 
@@ -40,7 +40,7 @@ const struct technique technique_screen_space = {
                     "percentage-closer soft shadows, SIGGRAPH 2010 posters",
         .artefacts = "Shadow edges off the screen or behind an object are missing from the blur, "
                      "so penumbrae end at silhouettes; the light is a Gaussian.",
-        .cost_class = PEN_COST_CHEAP,
+        .cost_class = PEN_COST_MEDIUM,
         .textured = false,
         .struct_size = sizeof(struct screen_space),
         .params = {rows, sizeof rows / sizeof *rows}},

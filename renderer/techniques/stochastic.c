@@ -22,7 +22,7 @@ static const struct pen_param rows[] = {
     MAP_SIZE_ROW(struct stochastic, 1024),
     BIAS_ROW(struct stochastic),
     PENUMBRA_ROWS(struct stochastic, 12),
-    PARAM(struct stochastic, levels, .def = 3, .min = 0, .max = 6,
+    PARAM(struct stochastic, levels, .def = 2, .min = 0, .max = 6,
         .help = "Levels of the a-trous filter; each doubles its reach."),
     PARAM(struct stochastic, blur, .def = 0.5, .min = 0, .max = 4,
         .help = "Width of the filter over that of the penumbra."),
@@ -32,8 +32,8 @@ static const struct pen_param rows[] = {
 static bool record(struct technique_run *run, struct pen_error *error)
 {
     const struct stochastic *params = run->params;
-    return pass_light_samples(run, params->maps, params->map_size, true, error) &&
-           pass_penumbra_spread(run, params->map_size, true, error) &&
+    return pass_penumbra_spread(run, params->map_size, error) &&
+           pass_light_samples(run, params->maps, params->map_size, params->samples, error) &&
            pass_penumbra_atrous(run, params->levels, error);
 }
 

@@ -57,7 +57,7 @@ static void check_thresholds(const uint8_t *id)
             char method[160];
             struct shot never, always, average, fixed;
             const char *texture = textured ? TWO_COLOUR : "";
-            const char *format = "adaptive&colour=0&blend=0&estimator=%s&%s";
+            const char *format = "adaptive&classify=off&colour=0&blend=0&estimator=%s&%s";
             snprintf(method, sizeof method, format, estimators[i], "theta=0.25");
             render(id, method, HARNESS_RECT, texture, &never);
             snprintf(method, sizeof method, format, estimators[i], "mode=average");
@@ -101,6 +101,20 @@ static void check_white(const uint8_t *id)
     harness_shot_finish(&split);
 }
 
+/* Tiles that the classifier decides need no work and give the same picture. */
+static void check_classify(const uint8_t *id)
+{
+    struct shot on, off;
+    double worst;
+    render(id, "adaptive&classify=on", HARNESS_RECT, TWO_COLOUR, &on);
+    render(id, "adaptive&classify=off", HARNESS_RECT, TWO_COLOUR, &off);
+    textured_difference(&on, &off, &worst);
+    CHECK(worst < 1.0 / 255);
+    CHECK(on.result.class_pixels[0] > 0 && on.result.full_work_pixels < 256 * 256);
+    harness_shot_finish(&on);
+    harness_shot_finish(&off);
+}
+
 /* Largest step of red between neighbours along the middle row, beyond the slope of T5 itself. */
 static double largest_step(const uint8_t *id, const char *method)
 {
@@ -135,6 +149,7 @@ int main(void)
     check_t5(id);
     check_thresholds(id);
     check_white(id);
+    check_classify(id);
     check_seams(id);
     CHECK_DONE();
 }

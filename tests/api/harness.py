@@ -124,8 +124,8 @@ class Daemon:
 
     def worker(self):
         """The pid of a worker that takes jobs."""
-        wait(lambda: self.metric("penumbra_workers_up") == 1 and self.children("penumbra-worker"))
-        return self.children("penumbra-worker")[0]
+        return wait(lambda: self.metric("penumbra_workers_up") == 1 and
+                    self.children("penumbra-worker"))[0]
 
     def leftovers(self):
         return os.listdir(os.path.join(self.store, "tmp"))

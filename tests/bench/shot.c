@@ -81,6 +81,7 @@ int main(int argc, char **argv)
     printf("class pixels %u %u %u, full work %u, triangles %u\n", result.class_pixels[0],
         result.class_pixels[1], result.class_pixels[2], result.full_work_pixels,
         result.triangles_drawn);
+    printf("sample maps %u\n", result.shadow_maps);
     for (uint32_t i = 0; i < result.warning_count; i++)
         printf("warning: %s\n", result.warnings[i]);
     if (!pen_encode(&frame, &request.output, NULL, 0, &bytes, &error))

@@ -1,0 +1,36 @@
+// Occlusion bits of the emitter's points (passes/light_bits.h). LIGHT_BITS is 64 or 256; patches
+// that overlap set the same bits, so casters behind one another count once.
+layout(binding = 8) uniform usampler2DArray bits_below; // (step, 2 pattern + axis, 128 bits)
+const int BIT_LAYERS = LIGHT_BITS == 256 ? 2 : 1;
+const float BIT_STEPS = 512.0;
+
+uvec4 hidden_bits[BIT_LAYERS]; // 64: xy
+int bit_pattern;
+
+void bits_begin(int pattern)
+{
+    bit_pattern = pattern;
+    for (int i = 0; i < BIT_LAYERS; i++)
+        hidden_bits[i] = uvec4(0u);
+}
+
+void bits_add(vec2 low, vec2 high)
+{
+    ivec4 at = ivec4(clamp(vec4(low, high) * 0.5 + 0.5, 0.0, 1.0) * BIT_STEPS + 0.5);
+    int row = 2 * bit_pattern;
+    for (int i = 0; i < BIT_LAYERS; i++)
+        hidden_bits[i] |= texelFetch(bits_below, ivec3(at.z, row, i), 0) &
+            ~texelFetch(bits_below, ivec3(at.x, row, i), 0) &
+            texelFetch(bits_below, ivec3(at.w, row + 1, i), 0) &
+            ~texelFetch(bits_below, ivec3(at.y, row + 1, i), 0);
+}
+
+float bits_lit_share()
+{
+    int count = 0;
+    for (int i = 0; i < BIT_LAYERS; i++) {
+        ivec4 n = bitCount(hidden_bits[i]);
+        count += n.x + n.y + n.z + n.w;
+    }
+    return 1.0 - float(count) * (1.0 / float(LIGHT_BITS));
+}

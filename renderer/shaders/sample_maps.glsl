@@ -1,0 +1,115 @@
+// Lookups in the depth maps of points of the emitter (passes/sample_maps.h).
+struct SampleMap {
+    vec4 at;     // xy emitter position, zw the same in [-1, 1]^2
+    vec4 window; // uv = l * xy + zw
+    vec4 layer;  // x layer, y weight, z side of the part of the emitter, in uv; w the method's own
+};
+
+// What of the receiver is the same for all samples.
+struct SampledReceiver {
+    vec3 p, n;
+    float depth, bias; // hardware depth
+    float ratio, range, np, least;
+};
+
+SampledReceiver sampled_receiver(Surface s, float bias)
+{
+    SampledReceiver r;
+    r.p = s.p;
+    r.n = s.n;
+    r.depth = light_depth(s.p.z);
+    r.bias = bias * s.p.z * light_depth_slope(s.p.z);
+    r.ratio = light.near_z / s.p.z;
+    r.range = light.far_z - light.near_z;
+    r.np = dot(s.n, s.p);
+    r.least = 0.02 * length(s.p);
+    return r;
+}
+
+// The receiver as one sample sees it: where its map shows it, and the gradient of the receiver's
+// plane in hardware depth over the map plane (F6 with the origin moved to the sample).
+struct SampleView {
+    vec2 l;        // m on the map plane
+    vec2 gradient; // m^-1
+    float facing;  // positive: the sample is above the receiver's horizon
+};
+
+SampleView sample_view(SampledReceiver r, vec2 at)
+{
+    SampleView v;
+    float slope;
+    if (light_parallel) {
+        v.l = r.p.xy + at * r.p.z;
+        v.facing = -(r.n.z - dot(r.n.xy, at));
+        slope = 1.0 / (max(v.facing, 0.02) * r.range);
+    } else {
+        v.l = at + (r.p.xy - at) * r.ratio;
+        v.facing = dot(r.n.xy, at) - r.np;
+        slope = light.far_z / (r.range * max(v.facing, r.least));
+    }
+    v.gradient = slope * r.n.xy;
+    return v;
+}
+
+// Depth that a map's texel must reach for the receiver to be lit, `offset` metres beside v.l.
+float sample_plane(SampledReceiver r, SampleView v, vec2 offset)
+{
+    return min(r.depth + dot(v.gradient, offset), 1.0) - r.bias;
+}
+
+// The texel under v.l + offset: its depth, and the receiver's plane at its centre.
+vec2 sample_depths(sampler2DArray maps, vec2 size, SampleMap map, SampledReceiver r, SampleView v,
+    vec2 offset)
+{
+    vec2 uv = (v.l + offset) * map.window.xy + map.window.zw, texel = uv * size;
+    vec2 center = offset + (floor(texel) + 0.5 - texel) / (size * map.window.xy);
+    return vec2(texture(maps, vec3(uv, map.layer.x)).r, sample_plane(r, v, center));
+}
+
+float sample_lit(sampler2DArray maps, vec2 size, SampleMap map, SampledReceiver r, SampleView v)
+{
+    vec2 d = sample_depths(maps, size, map, r, v, vec2(0.0));
+    return d.y <= d.x ? 1.0 : 0.0;
+}
+
+// The comparison interpolated between the four texels around v.l + offset.
+float sample_lit_bilinear(sampler2DArray maps, vec2 size, SampleMap map, SampledReceiver r,
+    SampleView v, vec2 offset)
+{
+    vec2 texel = ((v.l + offset) * map.window.xy + map.window.zw) * size - 0.5;
+    vec2 base = floor(texel), f = texel - base, metres = 1.0 / (size * map.window.xy);
+    vec4 z = textureGather(maps, vec3((base + 1.0) / size, map.layer.x)); // (0,1) (1,1) (1,0) (0,0)
+    float corner = r.depth + dot(v.gradient, offset - f * metres);
+    vec2 step = v.gradient * metres;
+    vec4 plane = corner + vec4(step.y, step.x + step.y, step.x, 0.0);
+    vec4 lit = vec4(lessThanEqual(min(plane, 1.0) - r.bias, z));
+    return mix(mix(lit.w, lit.z, f.x), mix(lit.x, lit.y, f.x), f.y);
+}
+
+#ifdef KERNEL
+// Mean of the comparison over a square of KERNEL - 1 texels around v.l, which KERNEL^2 texels cover:
+// those at the border count for the part inside. KERNEL 2 is bilinear filtering, 1 a single texel.
+float sample_lit_box(sampler2DArray maps, vec2 size, SampleMap map, SampledReceiver r, SampleView v)
+{
+#if KERNEL == 1
+    return sample_lit(maps, size, map, r, v);
+#elif KERNEL == 2
+    return sample_lit_bilinear(maps, size, map, r, v, vec2(0.0));
+#else
+    vec2 low = (v.l * map.window.xy + map.window.zw) * size - 0.5 * float(KERNEL - 1);
+    vec2 base = floor(low), f = low - base, metres = 1.0 / (size * map.window.xy);
+    vec2 first = (base + 0.5 - low - 0.5 * float(KERNEL - 1)) * metres;
+    float sum = 0.0;
+    for (int y = 0; y < KERNEL; y++) {
+        float wy = y == 0 ? 1.0 - f.y : y == KERNEL - 1 ? f.y : 1.0;
+        for (int x = 0; x < KERNEL; x++) {
+            float wx = x == 0 ? 1.0 - f.x : x == KERNEL - 1 ? f.x : 1.0;
+            vec2 at = vec2(x, y);
+            float d = texture(maps, vec3((base + at + 0.5) / size, map.layer.x)).r;
+            sum += sample_plane(r, v, first + at * metres) <= d ? wx * wy : 0.0;
+        }
+    }
+    return sum / float((KERNEL - 1) * (KERNEL - 1));
+#endif
+}
+#endif

@@ -1,0 +1,34 @@
+// Filtered visibility of one page's samples where samples disagree: rgb = w e V, a = w V.
+#include "sample_maps.glsl"
+#include "tree_bits.glsl"
+layout(binding = 10) uniform sampler2DArray maps;
+layout(std140, binding = 3) uniform FilterBlock {
+    SampleMap samples[16];
+    ivec4 count; // x: samples of this page, y: pages
+    uvec4 used[6]; // bits of the samples that the pages have
+} page;
+
+vec4 visibility(Surface s)
+{
+    bool lit = true, dark = true;
+    for (int i = 0; i < page.count.y; i++) {
+        uvec2 bits = page_bits(s.pixel, i);
+        uint used = page.used[i >> 2][i & 3];
+        lit = lit && (bits.x & used) == used;
+        dark = dark && (bits.y & used) == used;
+    }
+    bool seen = (page_bits(s.pixel, 0).x & FLAG) != 0u;
+    int count = seen && !lit && !dark ? page.count.x : 0;
+    SampledReceiver r = sampled_receiver(s, P(bias));
+    vec2 size = vec2(textureSize(maps, 0).xy);
+    vec4 sum = vec4(0.0);
+    for (int i = 0; i < count; i++) {
+        SampleMap map = page.samples[i];
+        SampleView v = sample_view(r, map.at.xy);
+        float lit_share = sample_lit_box(maps, size, map, r, v);
+        float w = v.facing > 0.0 ? map.layer.y * lit_share : 0.0;
+        vec3 e = light.textured != 0 ? light_emission(map.at.zw, map.layer.z) : vec3(1.0);
+        sum += w * vec4(e, 1.0);
+    }
+    return sum;
+}

@@ -1,0 +1,55 @@
+// Sum over the leaves' corners. Where all samples agree it is 1 or 0 without looking.
+#include "sample_maps.glsl"
+#include "tree_bits.glsl"
+layout(binding = 10) uniform sampler2D filtered; // of adaptive_filter.glsl
+layout(std140, binding = 3) uniform ResolveBlock {
+    SampleMap samples[289]; // layer.w: page * 16 + bit
+    ivec4 count;            // x: samples, y: pages
+    uvec4 used[6];
+} tree;
+
+vec4 visibility(Surface s)
+{
+    uvec2 words[22];
+    bool lit = true, dark = true;
+    for (int i = 0; i < tree.count.y; i++) {
+        words[i] = page_bits(s.pixel, i);
+        uint used = tree.used[i >> 2][i & 3];
+        lit = lit && (words[i].x & used) == used;
+        dark = dark && (words[i].y & used) == used;
+    }
+    bool seen = (words[0].x & FLAG) != 0u; // else nothing can block
+    int count = seen && !lit && !dark ? tree.count.x : 0;
+    SampledReceiver r = sampled_receiver(s, 0.0);
+    float all_sum = 0.0, lit_sum = 0.0;
+    vec3 all_emission = vec3(0.0), lit_emission = vec3(0.0);
+    for (int i = 0; i < count; i++) {
+        SampleMap map = tree.samples[i];
+        float w = sample_view(r, map.at.xy).facing > 0.0 ? map.layer.y : 0.0;
+        vec3 e = light.textured != 0 ? light_emission(map.at.zw, map.layer.z) : vec3(1.0);
+        all_sum += w;
+        all_emission += w * e;
+#if KERNEL == 1
+        int place = int(map.layer.w);
+        float lit_share = float(words[place >> 4].x >> uint(place & 15) & 1u);
+        lit_sum += w * lit_share;
+        lit_emission += w * lit_share * e;
+#endif
+    }
+    if (count == 0) {
+        float v = seen && dark ? 0.0 : 1.0;
+        return scalar_visibility(v);
+    }
+#if KERNEL > 1
+    vec4 sum = texelFetch(filtered, s.pixel, 0);
+    lit_sum = sum.a;
+    lit_emission = sum.rgb;
+#endif
+    // Where little of the light is above the horizon the mean rests on a few samples: there it fades
+    // to 0, as in the multi-sampled reference.
+    float fade = min(4.0 * all_sum, 1.0), v = clamp(fade * lit_sum / max(all_sum, 1e-20), 0.0, 1.0);
+    if (light.textured == 0)
+        return scalar_visibility(v);
+    vec3 seen_share = clamp(fade * lit_emission / max(all_emission, vec3(1e-20)), 0.0, 1.0);
+    return vec4(light.emission_mean.rgb * seen_share, v);
+}

@@ -1,0 +1,61 @@
+// Schwarz and Stamminger 2007: as backprojection, but each map texel sets the bits of the emitter's
+// points that it hides, so that overlapping casters count once.
+#include "caster_patches.glsl"
+#if P_samples == 0
+#define LIGHT_BITS 64
+#else
+#define LIGHT_BITS 256
+#endif
+#include "light_bits.glsl"
+#ifdef TEXTURED
+layout(binding = 9) uniform sampler2D bit_emission; // (point, pattern)
+#endif
+
+void add_patch(vec2 low, vec2 high, float share)
+{
+    // Part of a coarse texel: a smaller rectangle of that area.
+    vec2 cut = 0.5 * (high - low) * (1.0 - sqrt(share));
+    bits_add(low + cut, high - cut);
+}
+
+#ifdef TEXTURED
+// Share of each channel's emission that comes from the points that are not hidden.
+vec3 emission_lit_share(int pattern)
+{
+    vec3 lit = vec3(0.0), all = vec3(0.0);
+    for (int i = 0; i < LIGHT_BITS; i++) {
+        uint word = hidden_bits[i >> 7][i >> 5 & 3];
+        vec3 e = texelFetch(bit_emission, ivec2(i, pattern), 0).rgb;
+        all += e;
+        lit += (word >> (i & 31) & 1u) != 0u ? vec3(0.0) : e;
+    }
+    return lit / max(all, 1e-6);
+}
+#endif
+
+vec4 visibility(Surface s)
+{
+    PatchWindow w = patch_window(s);
+    int pattern = 0;
+    if (P(pattern) == PATTERN_JITTERED) {
+        // Jittered frames of an anti-aliased image take other sets.
+        int pixel = (s.pixel.x & 3) | (s.pixel.y & 3) << 2;
+        pattern = pixel + 5 * int(view.display.z) & 15;
+    }
+    bits_begin(pattern);
+    walk_patches(w);
+    float lit = w.answer == UMBRA ? 0.0 : bits_lit_share();
+#ifdef INTERLEAVED
+    // Width on the screen, F5, of the sharpest shadow here, for the averaging pass.
+    float scale = light.parallel != 0 ? 1.0 : s.p.z / light.near_z;
+    float width = 2.0 * w.reach.x * min(w.narrowest / w.widest, 1.0);
+    float pixels = width * scale * view.eye.w * s.depth / view.forward.w;
+    return vec4(lit, lit < 1.0 ? pixels : 0.0, 0.0, 1.0);
+#elif defined(TEXTURED)
+    if (lit == 0.0 || lit == 1.0)
+        return scalar_visibility(lit);
+    return vec4(light.emission_mean.rgb * emission_lit_share(pattern), lit);
+#else
+    return scalar_visibility(lit);
+#endif
+}

@@ -1,0 +1,118 @@
+// One cascade: darkness of the receivers in its range of view distances, times its share of them
+// where cascades blend. rgb = mean emission - T, a = 1 - V: what no cascade touches stays lit.
+#include "sample_maps.glsl"
+#include "min_max.glsl"
+layout(binding = 7) uniform sampler2DArray maps;
+layout(std140, binding = 3) uniform CascadeBlock {
+    SampleMap samples[64];
+    ivec4 count; // x: samples
+    vec4 fade;   // in from x to y, out from z to w, m of view distance
+} cascade;
+
+float ramp(float d, float from, float to)
+{
+    return clamp((d - from) / max(to - from, 1e-20), 0.0, 1.0);
+}
+
+// Half extents on the map plane that one sample's kernel must cover to meet its neighbours': the
+// image of its part of the emitter, for the mean depth of what blocks (F3). Negative: nothing blocks.
+// `above`: share of the emitter above the receiver's horizon, where something may block.
+vec2 kernel_extent(SampledReceiver r, vec2 size, vec2 q, out float above)
+{
+    float nearest_z, sum = 0.0, blockers = 0.0, share = 0.0;
+    vec2 texel = (light.rect.zw - light.rect.xy) / vec2(2 * textureSize(min_max_pyramid, 0));
+    vec2 search = min_max_search_extent(q, r.p.z, texel, nearest_z) / float(SIDE);
+    int count = nearest_z < r.p.z ? cascade.count.x : 0;
+    for (int i = 0; i < count; i++) {
+        SampleMap map = cascade.samples[i];
+        SampleView v = sample_view(r, map.at.xy);
+        share += v.facing > 0.0 ? map.layer.y : 0.0;
+        for (int k = 0; k < (map.layer.x < 0.0 ? 0 : 4); k++) {
+            vec2 offset = (vec2(k & 1, k >> 1) - 0.5) * search;
+            vec2 d = sample_depths(maps, size, map, r, v, offset);
+            if (d.x < d.y) {
+                sum += light_linear(d.x);
+                blockers += 1.0;
+            }
+        }
+    }
+    above = count == 0 ? 1.0 : share;
+    if (blockers == 0.0)
+        return vec2(-1.0);
+    return light_filter_extent(min(sum / blockers, r.p.z), r.p.z) / float(SIDE);
+}
+
+// KERNEL^2 taps over +- extent around the sample's view of the receiver, at least +- a texel. The
+// samples shift their taps against each other, so that straight edges get KERNEL * SIDE * SIDE levels;
+// where that is few, each comparison is interpolated too.
+float lit_bridged(vec2 size, SampleMap map, SampledReceiver r, SampleView v, vec2 extent, int i)
+{
+    vec2 spacing = 2.0 / float(KERNEL) * max(extent, 1.0 / (size * map.window.xy));
+    vec2 shift = (vec2(i / SIDE, i % SIDE) + 0.5) / float(SIDE) - 0.5 * float(KERNEL);
+    float sum = 0.0;
+    for (int y = 0; y < KERNEL; y++)
+        for (int x = 0; x < KERNEL; x++) {
+            vec2 offset = (shift + vec2(x, y)) * spacing;
+#if KERNEL * SIDE * SIDE >= 48
+            vec2 d = sample_depths(maps, size, map, r, v, offset);
+            sum += d.y <= d.x ? 1.0 : 0.0;
+#else
+            sum += sample_lit_bilinear(maps, size, map, r, v, offset);
+#endif
+        }
+    return sum / float(KERNEL * KERNEL);
+}
+
+vec4 visibility(Surface s)
+{
+    float view_z = view.forward.w / s.depth;
+    float share = ramp(view_z, cascade.fade.x, cascade.fade.y) *
+        (1.0 - ramp(view_z, cascade.fade.z, cascade.fade.w));
+    if (share <= 0.0)
+        discard;
+    vec2 size = vec2(textureSize(maps, 0).xy), q = light_project(s.p), extent = vec2(0.0);
+    SampledReceiver r = sampled_receiver(s, P(bias));
+    int count = cascade.count.x;
+    float above = 1.0;
+#if KERNEL > 1
+    if (P(filter) == FILTER_BRIDGE) {
+        extent = kernel_extent(r, size, q, above);
+        count = extent.x < 0.0 ? 0 : count; // a dynamic bound skips the loop, a return would not
+    }
+#endif
+    // Light below the receiver's horizon is left out of the mean.
+    float all_sum = 0.0, lit_sum = 0.0;
+    vec3 all_emission = vec3(0.0), lit_emission = vec3(0.0);
+    for (int i = 0; i < count; i++) {
+        SampleMap map = cascade.samples[i];
+        SampleView v = sample_view(r, map.at.xy);
+        float w = v.facing > 0.0 ? map.layer.y : 0.0, lit = 1.0;
+        if (map.layer.x >= 0.0) {
+#if KERNEL > 1
+            if (P(filter) == FILTER_BRIDGE)
+                lit = lit_bridged(size, map, r, v, extent, i);
+            else
+#endif
+                lit = sample_lit_box(maps, size, map, r, v);
+        }
+        all_sum += w;
+        lit_sum += w * lit;
+        if (light.textured != 0) {
+            vec3 e = light_emission(map.at.zw, map.layer.z);
+            all_emission += w * e;
+            lit_emission += w * lit * e;
+        }
+    }
+    // What is seen of each colour, so that lit receivers see exactly the mean emission.
+    float v = 1.0;
+    vec3 seen = vec3(1.0);
+    if (count > 0) {
+        above = all_sum;
+        v = lit_sum / max(all_sum, 1e-20);
+        seen = light.textured != 0 ? lit_emission / max(all_emission, vec3(1e-20)) : vec3(v);
+    }
+    // Where little of the light is above the horizon the mean rests on a few samples: there it fades
+    // to 0, as in the multi-sampled reference.
+    float fade = min(above * 4.0, 1.0);
+    return share * vec4(light.emission_mean.rgb * (1.0 - fade * seen), 1.0 - fade * v);
+}

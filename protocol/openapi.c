@@ -34,6 +34,8 @@ static void write_content(struct pen_json *json, enum pen_body body)
         [PEN_BODY_IMAGES] = SCHEMA "ImageList",
         [PEN_BODY_IMAGE_INFO] = SCHEMA "ImageInfo",
         [PEN_BODY_STATS] = NULL,
+        [PEN_BODY_COMPARE] = SCHEMA "CompareRequest",
+        [PEN_BODY_COMPARISON] = SCHEMA "Comparison",
     };
     pen_json_object(json, "content");
     switch (body) {

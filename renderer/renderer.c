@@ -279,6 +279,12 @@ fail:
     return false;
 }
 
+void pen_renderer_drop_shadows(struct pen_renderer *r)
+{
+    shadow_cache_begin_frame(r->ctx.shadows); /* the last frame's inputs may go too */
+    shadow_cache_trim(r->ctx.shadows, 0);
+}
+
 bool pen_renderer_is_lost(struct pen_renderer *r)
 {
     return r->lost || gl.GetGraphicsResetStatus() != GL_NO_ERROR;

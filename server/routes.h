@@ -28,6 +28,7 @@ struct call {
     struct pen_request request;
     struct waiter waiter;
     bool holds_share, wants_record, is_cached;
+    struct pen_compare *compare;
     /* For the log: */
     const char *technique;
     double queue_ms, render_ms;
@@ -49,6 +50,10 @@ bool routes_begin_upload(struct call *call); /* at the header: false when it has
 void routes_import(struct call *call);
 void routes_render(struct call *call);
 void routes_result(struct call *call);
+void routes_compare(struct call *call);
+
+/* Everything the call's request refers to must be in the store. */
+bool routes_check_store(struct call *call, uint32_t *retry_after_s, struct pen_error *error);
 
 /* Answers. */
 void routes_fail(struct call *call, const struct pen_error *error, uint32_t retry_after_s);

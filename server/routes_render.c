@@ -117,8 +117,7 @@ static bool negotiate(struct call *call, struct pen_error *error)
         "The image is %s, which Accept does not allow.", pen_format_mime[output->format]);
 }
 
-/* Everything the request refers to must be in the store. */
-static bool check_store(struct call *call, uint32_t *retry_after_s, struct pen_error *error)
+bool routes_check_store(struct call *call, uint32_t *retry_after_s, struct pen_error *error)
 {
     struct service *s = call->service;
     struct store_entry entry;
@@ -161,7 +160,7 @@ void routes_render(struct call *call)
     }
     memcpy(call->request.scene, call->id, PEN_ID_BYTES);
     call->technique = pen_catalogue_find(s->catalogue, call->request.technique)->name;
-    if (!check_store(call, &retry_after_s, &error)) {
+    if (!routes_check_store(call, &retry_after_s, &error)) {
         routes_fail(call, &error, retry_after_s);
         return;
     }

@@ -29,22 +29,6 @@ static void set_axes(
     memcpy(f->world_to_light, m, sizeof m);
 }
 
-/* World bounds of one instance: of its primitive's box, transformed (exact for a box). */
-static void instance_bounds(
-    const struct psc_scene *blob, uint32_t instance, float min[3], float max[3])
-{
-    const float *m = blob->instances[instance].world;
-    const struct psc_primitive *p = &blob->primitives[blob->instances[instance].primitive];
-    for (int row = 0; row < 3; row++) {
-        min[row] = max[row] = m[4 * row + 3];
-        for (int k = 0; k < 3; k++) {
-            float a = m[4 * row + k] * p->bounds_min[k], b = m[4 * row + k] * p->bounds_max[k];
-            min[row] += fminf(a, b);
-            max[row] += fmaxf(a, b);
-        }
-    }
-}
-
 /* A flat floor or wall on the far side of the bounds has everything else between itself and the
  * light: it receives, but it casts on nothing, and need not widen the map's window. */
 static bool is_backdrop(const struct scene *scene, const float min[3], const float max[3],
@@ -69,7 +53,7 @@ void light_find_backdrops(const struct light *light, const struct scene *scene, 
     bool sun = light->source->type == PEN_LIGHT_SUN;
     for (uint32_t i = 0; i < scene->blob.instance_count; i++) {
         float min[3], max[3];
-        instance_bounds(&scene->blob, i, min, max);
+        scene_instance_bounds(scene, i, min, max);
         backdrop[i] = is_backdrop(scene, min, max, light->origin, sun ? light->z : NULL);
     }
 }
@@ -82,7 +66,7 @@ static void caster_bounds(const struct scene *scene, const struct light *light, 
     bool sun = light->source->type == PEN_LIGHT_SUN;
     for (uint32_t i = 0; i < scene->blob.instance_count; i++) {
         float min[3], max[3];
-        instance_bounds(&scene->blob, i, min, max);
+        scene_instance_bounds(scene, i, min, max);
         if (is_backdrop(scene, min, max, light->origin, sun ? light->z : NULL))
             continue;
         for (int k = 0; k < 3; k++) {
@@ -128,7 +112,7 @@ static void geometry_range(const struct light_face *f, const struct scene *scene
         const struct psc_instance *instance = &scene->blob.instances[i];
         const struct psc_primitive *p = &scene->blob.primitives[instance->primitive];
         float bounds[2][3], box[2], row[4];
-        instance_bounds(&scene->blob, i, bounds[0], bounds[1]);
+        scene_instance_bounds(scene, i, bounds[0], bounds[1]);
         box_range(f, bounds, box);
         for (int k = 0; k < 4; k++) /* row z of world_to_light * world */
             row[k] = f->world_to_light[0][2] * instance->world[k] +

@@ -18,7 +18,8 @@ static bool move_pointer(struct pen_error *error, const char *to)
 {
     static const char from[] = "/technique";
     char moved[sizeof error->pointer];
-    if (!strncmp(error->pointer, from, sizeof from - 1)) {
+    char next = error->pointer[strnlen(error->pointer, sizeof from - 1)];
+    if (!strncmp(error->pointer, from, sizeof from - 1) && (!next || next == '/')) {
         snprintf(moved, sizeof moved, "%s%s", to, error->pointer + sizeof from - 1);
         memcpy(error->pointer, moved, sizeof moved);
     }
@@ -132,6 +133,16 @@ static bool read_root(const struct reader *reader, cJSON *root, struct pen_compa
     cJSON *list = cJSON_DetachItemFromObjectCaseSensitive(root, "techniques");
     cJSON *reference = complete_reference(
         reader, cJSON_DetachItemFromObjectCaseSensitive(root, "reference"), compare);
+    static const char *const twice[] = {"techniques", "reference"};
+    for (int i = 0; i < 2; i++)
+        if (cJSON_GetObjectItemCaseSensitive(root, twice[i])) {
+            char pointer[32];
+            snprintf(pointer, sizeof pointer, "/%s", twice[i]);
+            cJSON_Delete(list);
+            cJSON_Delete(reference);
+            return pen_fail(reader->error, PEN_UNPROCESSABLE, pointer,
+                "The key \"%s\" is given twice.", twice[i]);
+        }
     bool all = !list || (cJSON_IsString(list) && !strcmp(list->valuestring, "all"));
     bool ok = read_method(reader, root, reference, "/reference", &compare->requests[0]) &&
               (all ? read_all(reader, root, compare) : read_list(reader, root, list, compare));

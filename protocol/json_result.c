@@ -71,7 +71,11 @@ char *pen_result_json(const struct pen_result *result, const struct pen_record_e
     pen_json_array(&json, "warnings");
     for (uint32_t w = 0; w < least(result->warning_count, PEN_MAX_WARNINGS); w++)
         pen_json_string(&json, NULL, result->warnings[w]);
+    if (extra->choice && !extra->choice_met)
+        pen_json_string(&json, NULL, extra->choice);
     pen_json_end(&json);
+    if (extra->choice)
+        pen_json_string(&json, "choice", extra->choice);
     pen_result_write_device(&json, &result->device);
     pen_json_object(&json, "cache");
     pen_json_bool(&json, "result", extra->from_cache);

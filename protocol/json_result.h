@@ -20,8 +20,10 @@ struct pen_record_extra {
     const char *request_id;
     const char *image_href; /* where the image can be fetched */
     const char *etag;
-    double total_ms; /* from the last byte of the request to the record */
-    bool from_cache; /* the image was not rendered for this request */
+    double total_ms;    /* from the last byte of the request to the record */
+    bool from_cache;    /* the image was not rendered for this request */
+    const char *choice; /* why this method was taken, when the request left that open */
+    bool choice_met;    /* false: nothing meets what was asked */
 };
 
 /* The full record of a render: the request as completed, warnings, device, cache hits, times per

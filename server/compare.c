@@ -1,5 +1,6 @@
 #include "server/compare.h"
 #include "server/channel.h"
+#include "server/clock.h"
 #include <fcntl.h>
 #include <stdlib.h>
 #include <string.h>
@@ -26,11 +27,12 @@ static bool submit(struct compare *c, uint32_t *retry_after_s, struct pen_error 
     uint8_t key[PEN_ID_BYTES];
     picture_key(request, key);
     c->waiter.client = c->at ? 0 : c->plan.client;
-    c->waiter.deadline_ns = c->plan.deadline_ns;
-    c->waiter.measure = !c->at                 ? CHANNEL_REFERENCE
-                        : c->plan.numbers_only ? CHANNEL_NUMBERS
-                                               : CHANNEL_COMPARED;
-    c->waiter.reference_fd = c->at ? c->planes_fd : 0;
+    c->waiter.deadline_ns =
+        c->plan.deadline_ns ? c->plan.deadline_ns : clock_now_ns() + c->plan.patience_ms * CLOCK_MS;
+    c->waiter.measure = c->plan.measures ? c->plan.measures[c->at]
+                        : c->at          ? CHANNEL_COMPARED
+                                         : CHANNEL_REFERENCE;
+    c->waiter.reference_fd = channel_has_reference(c->waiter.measure) ? c->planes_fd : 0;
     return scheduler_submit(c->scheduler, request, key, false, &c->waiter, retry_after_s, error);
 }
 
@@ -47,7 +49,8 @@ static void take(struct compare *c, const struct outcome *outcome)
     if (outcome->result)
         row->result = *outcome->result;
     row->result.error = outcome->error;
-    if (outcome->picture)
+    row->run_ms = outcome->run_ms;
+    if (outcome->picture && c->waiter.measure != CHANNEL_PICTURE)
         row->image = picture_reference(outcome->picture);
     for (int m = 0; m < CHANNEL_MAPS; m++)
         if (outcome->maps[m])
@@ -66,7 +69,10 @@ static void finish(struct waiter *waiter, const struct outcome *outcome)
     bool over = ends_all(c, &error);
     if (!over) {
         memset(&error, 0, sizeof error);
-        over = ++c->at == c->plan.count || !submit(c, &retry_after_s, &error);
+        do
+            c->at++;
+        while (c->at < c->plan.count && c->plan.wants && !c->plan.wants(c->plan.owner, c, c->at));
+        over = c->at == c->plan.count || !submit(c, &retry_after_s, &error);
     }
     if (over) /* else the next one may have ended everything by now: c is not ours any more */
         c->plan.done(c->plan.owner, c, &error, retry_after_s);

@@ -8,9 +8,13 @@ struct compare;
 struct compare_plan {
     const struct pen_request *requests; /* [0] is the reference */
     uint32_t count;                     /* with the reference */
-    bool numbers_only;                  /* no pictures: CHANNEL_NUMBERS */
-    uint64_t client;                    /* whose share it uses, as one render; 0: nobody's */
-    uint64_t deadline_ns;
+    const uint32_t *measures; /* enum channel_measure, one per request, the first a reference;
+                                 NULL: the others are CHANNEL_COMPARED */
+    uint64_t client;          /* whose share it uses, as one render; 0: nobody's */
+    uint64_t deadline_ns;     /* of all together; 0: patience_ms for each */
+    uint32_t patience_ms;
+    /* Called before every request but the first; false leaves it out. May be NULL. */
+    bool (*wants)(void *owner, struct compare *compare, uint32_t request);
     bool (*is_gone)(void *owner); /* the client has hung up; may be NULL */
     /* Called once, from any thread. PEN_OK: the measurements are there. Ends with
      * compare_destroy. */
@@ -20,8 +24,9 @@ struct compare_plan {
 };
 
 struct compare_row {
-    struct pen_result result; /* error.code set: this one could not be rendered */
-    struct picture *image, *maps[3];
+    struct pen_result result;        /* error.code set: this one could not be rendered */
+    struct picture *image, *maps[3]; /* of measurements */
+    double run_ms;                   /* on the worker; 0: left out */
 };
 
 /* One measurement after the other, so that none disturbs the times of another. They go through the

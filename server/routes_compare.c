@@ -1,5 +1,6 @@
 /* Methods against a reference. */
 #include "protocol/json_compare.h"
+#include "server/auto_choice.h"
 #include "server/clock.h"
 #include "server/compare.h"
 #include "server/routes.h"
@@ -72,7 +73,7 @@ static bool read_body(struct call *call, struct pen_error *error)
     if (!call->compare)
         abort();
     return pen_compare_from_json(text, call->text_bytes ? call->text_bytes : 2,
-        call->service->catalogue, NULL, call->compare, error);
+        call->service->catalogue, AUTO_NAME, call->compare, error);
 }
 
 void routes_compare(struct call *call)

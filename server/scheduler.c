@@ -324,6 +324,7 @@ void scheduler_finish(struct scheduler *s, struct render *render, const struct o
         s->mean_ms += 0.1 * (ms - s->mean_ms);
     answer.retry_after_s = retry_after(s);
     pthread_mutex_unlock(&s->lock);
+    answer.run_ms = ms;
     answer.queue_ms = clock_ms(render->taken_ns - render->queued_ns);
     answer.shared = count > 1;
     answer_all(waiters, &answer);

@@ -8,9 +8,9 @@
 struct outcome {
     struct pen_error error;  /* PEN_OK: there is a picture */
     struct picture *picture; /* borrowed for the call */
-    double queue_ms;
-    uint32_t retry_after_s; /* with 429 and 503 */
-    bool shared;            /* another client's request rendered it */
+    double queue_ms, run_ms; /* before and after a worker took it */
+    uint32_t retry_after_s;  /* with 429 and 503 */
+    bool shared;             /* another client's request rendered it */
     /* Of measurements, borrowed like the picture: */
     const struct pen_result *result; /* also when nothing was encoded */
     int planes_fd;                   /* of a reference; 0: none */

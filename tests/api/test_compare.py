@@ -1,6 +1,9 @@
 """POST /v1/scenes/{id}/compare: figures against an independent reading of the pictures, errors."""
 import json
+import os
+import signal
 import struct
+import threading
 import unittest
 import zlib
 
@@ -195,9 +198,6 @@ class Compare(unittest.TestCase):
 
     def test_worker_dies(self):
         """A measurement is given to the next worker, like any render."""
-        import os
-        import signal
-        import threading
         pid = self.d.worker()
         killer = threading.Timer(0.15, lambda: os.kill(pid, signal.SIGKILL))
         killer.start()
@@ -205,6 +205,112 @@ class Compare(unittest.TestCase):
                                "reference": REFERENCE})
         killer.join()
         self.assertEqual(len([m for m in answer["methods"] if m.get("rmse", 0) > 0]), 5)
+
+
+class Auto(unittest.TestCase):
+    """"technique": "auto" measures once and then chooses."""
+    @classmethod
+    def setUpClass(cls):
+        cls.d = Daemon()
+        cls.id = cls.d.upload(caster_scene())
+        cls.d.worker()
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.d.kill()
+
+    def record(self, wish, **more):
+        answer = self.d.render(
+            self.id, {**VIEW, "technique": {"name": "auto", "params": wish}, **more},
+            fresh=False, Accept="application/json")
+        self.assertEqual(answer.status, 200, answer.body)
+        return answer.json()
+
+    def files(self):
+        folder = os.path.join(self.d.store, "scenes", self.id)
+        return {name: os.path.getmtime(os.path.join(folder, name))
+                for name in os.listdir(folder) if name.startswith("calibration")}
+
+    def check_error(self, record, limit):
+        """Its error against raytraced, at the full size, by way of a comparison."""
+        request = record["request"]
+        compared = self.d.call(
+            "POST", "/v1/scenes/%s/compare" % self.id,
+            json.dumps({**VIEW, "techniques": [request["technique"]]}),
+            {"Content-Type": "application/json"}).json()
+        self.assertLessEqual(compared["methods"][0]["rmse"], limit)
+
+    def test_error(self):
+        chosen = {}
+        for limit in (0.3, 0.02, 0.005):
+            record = self.record({"max_rmse": limit})
+            chosen[limit] = record["request"]["technique"]["name"]
+            self.assertNotEqual(chosen[limit], "auto")
+            self.assertIn("max_rmse %g" % limit, record["choice"])
+            self.assertTrue(record["choice"].startswith(chosen[limit]))
+            self.check_error(record, limit)
+        self.assertIn(chosen[0.005], ("raytraced", "multisample", "cascaded", "bilateral"))
+
+    def test_measures_once(self):
+        self.record({"max_rmse": 0.05})
+        before = self.files()
+        self.assertEqual(len(before), 1)
+        renders = self.d.metric("penumbra_cache_misses_total")
+        again = self.record({"max_rmse": 0.05}, width=48, height=36)
+        self.assertEqual(self.files(), before)
+        self.assertLess(self.d.metric("penumbra_cache_misses_total") - renders, 3)
+        self.assertGreater(again["total_ms"], 0)
+        # Another view has another error: it is measured, and both are kept.
+        self.record({"max_rmse": 0.05}, camera={"orbit": {"azimuth_deg": 70}})
+        self.assertNotEqual(self.files(), before)
+
+    def test_budget(self):
+        wide = self.record({"budget_ms": 50000})
+        self.assertEqual(wide["warnings"], [])
+        self.assertIn("most accurate", wide["choice"])
+        # What nothing meets is served all the same, by what comes nearest, and said.
+        tight = self.record({"budget_ms": 0.01})
+        self.assertEqual(len(tight["warnings"]), 1)
+        self.assertIn("nothing meets", tight["warnings"][0])
+
+    def test_image(self):
+        """As an image: the header says what was taken, and the tag is that of the same request."""
+        path = "/v1/scenes/%s/render?technique=auto&max_rmse=0.1&width=64&height=48" % self.id
+        first = self.d.get(path)
+        self.assertEqual(first.status, 200)
+        self.assertEqual(first.headers["Content-Type"], "image/png")
+        self.assertIn("max_rmse 0.1", first.headers["X-Penumbra-Choice"])
+        again = self.d.get(path, If_None_Match=first.headers["ETag"])
+        self.assertEqual(again.status, 304)
+
+    def test_together(self):
+        """Requests that come while a view is being measured wait for the same measurement."""
+        camera = {"orbit": {"azimuth_deg": 200}}
+        records = []
+        threads = [threading.Thread(target=lambda: records.append(
+            self.record({"max_rmse": 0.1}, camera=camera))) for _ in range(3)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        self.assertEqual(len({r["choice"] for r in records}), 1)
+
+    def test_deadline(self):
+        """One that cannot wait is told so; the measurement goes on for the next."""
+        camera = {"orbit": {"azimuth_deg": 300}}
+        answer = self.d.render(self.id, {**VIEW, "technique": "auto", "camera": camera,
+                                         "deadline_ms": 1})
+        self.assertEqual(answer.status, 504, answer.body)
+        self.assertTrue(self.record({"max_rmse": 0.1}, camera=camera)["choice"])
+
+    def test_refused(self):
+        for params in ({"max_rmse": -1}, {"max_rmse": 2}, {"budget_ms": "1"}, {"speed": 1}):
+            answer = self.d.render(self.id, {"technique": {"name": "auto", "params": params}})
+            self.assertEqual(answer.status, 422)
+        answer = self.d.call("POST", "/v1/scenes/%s/compare" % self.id,
+                             json.dumps({"techniques": ["auto"]}),
+                             {"Content-Type": "application/json"})
+        self.assertEqual((answer.status, answer.json()["pointer"]), (422, "/techniques/0"))
 
 
 if __name__ == "__main__":

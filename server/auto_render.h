@@ -1,0 +1,6 @@
+/* Renders whose method is left open: measures a scene when nothing is known of it. */
+#pragma once
+
+struct auto_runs;
+struct auto_runs *auto_runs_create(void);
+void auto_runs_destroy(struct auto_runs *runs); /* none may be under way; NULL is fine */

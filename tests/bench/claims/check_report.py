@@ -26,7 +26,7 @@ def group(name, variants, comparisons=()):
     return {"group": name, "scene": name.rpartition("-")[2], "settings": "", "triangles": 4,
             "width": 100, "height": 10, "comparisons": list(comparisons),
             "variants": [{"name": key, "settings": "", "status": "ok", "warnings": [],
-                          "subdivided_pixels": [900, 30, 20], "moving": times(value)}
+                          "subdivided_pixels": [30, 20], "moving": times(value)}
                          if value else {"name": key, "settings": "", "status": "not built"}
                          for key, value in variants.items()]}
 

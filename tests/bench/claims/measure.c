@@ -174,9 +174,10 @@ static void write_variant(struct pen_json *json, const struct plan_group *group,
         pen_json_double(json, "first_s", picture->seconds);
         pen_json_uint(json, "full_work_pixels", result->full_work_pixels);
         pen_json_array(json, "subdivided_pixels");
-        for (int k = 0; k < 3; k++)
+        for (int k = 0; k < 2; k++)
             pen_json_uint(json, NULL, result->subdivided_pixels[k]);
         pen_json_end(json);
+        pen_json_uint(json, "shadow_maps", result->shadow_maps);
         pen_json_uint(json, "gpu_bytes", result->gpu_bytes);
         pen_json_array(json, "warnings");
         for (uint32_t w = 0; w < result->warning_count; w++)

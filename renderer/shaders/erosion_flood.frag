@@ -11,12 +11,14 @@ layout(location = 0) out vec2 seed;
 void main()
 {
     ivec2 pixel = ivec2(gl_FragCoord.xy), last = ivec2(view.viewport.xy) - 1;
-    vec4 hard = texelFetch(hard_map, pixel, 0), axes = texelFetch(axes_map, pixel, 0);
+    vec4 hard = texelFetch(hard_map, pixel, 0);
+    if (hard.z == 0.0)
+        discard; // no penumbra can reach here: FAR, as the target starts
+    vec4 axes = texelFetch(axes_map, pixel, 0);
     Plane plane = plane_at(pixel);
     float best = FAR;
     seed = vec2(FAR);
-    int count = hard.z > 0.0 ? 9 : 0;
-    for (int i = 0; i < count; i++) {
+    for (int i = 0; i < 9; i++) {
         ivec2 jump = (ivec2(i % 3, i / 3) - 1) * flood.step.x, at = pixel + jump;
         if (at != clamp(at, ivec2(0), last))
             continue;

@@ -18,7 +18,10 @@ static const struct pen_param rows[] = {
     PARAM(struct accumulation, mode, .def = 1, .choices = mode_names, .specialise = 1,
         .help = "As published, with kernel x kernel points, or with the texels' rectangles clipped "
                 "against the light."),
-    KERNEL_ROW(struct accumulation),
+    PARAM(struct accumulation, kernel, .def = 8, .min = 4, .max = 64, .unit = "texel",
+        .help = "Mode paper: points across the window. Mode clipped: map texels across the light's "
+                "image on each caster's depth; the finest mip level that is walked has at least as "
+                "many."),
     LAYERS_ROW(struct accumulation),
     MIN_FILTER_ROW(struct accumulation),
     PARAM(struct accumulation, window, .choices = window_names, .specialise = 1,

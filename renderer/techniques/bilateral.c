@@ -29,7 +29,7 @@ static const struct pen_param rows[] = {
 static bool record(struct technique_run *run, struct pen_error *error)
 {
     const struct bilateral *params = run->params;
-    return pass_penumbra_spread(run, params->map_size, error) &&
+    return pass_penumbra_spread(run, params->map_size, params->min_filter, error) &&
            pass_light_samples(run, params->samples, params->map_size, params->samples, error) &&
            pass_penumbra_gauss(run, PENUMBRA_SAMPLES, error);
 }

@@ -16,16 +16,15 @@ float edge_within(ivec2 pixel, float radius)
             texelFetch(edge_pyramid, ivec2(a.x, b.y), level).x));
 }
 
-// Mean W of the edges around, by a tent of 5 x 5 filtered taps: the pyramid's maxima would show their
+// Mean W of the edges around, by a tent of 3 x 3 filtered taps: the pyramid's maxima would show their
 // blocks.
 float edge_mean(ivec2 pixel, float radius)
 {
-    float lod = max(log2(radius) - 1.0, 0.0);
+    float lod = max(log2(radius) - 0.6, 0.0);
     vec2 sum = vec2(1e-12, 0.0);
-    for (int i = 0; i < 25; i++) {
-        vec2 at = vec2(i % 5, i / 5) - 2.0;
-        vec2 tent = 1.0 - abs(at) / 3.0;
-        vec2 uv = (vec2(pixel) + 0.5 + 0.5 * radius * at) * view.viewport.zw;
+    for (int i = 0; i < 9; i++) {
+        vec2 at = vec2(i % 3, i / 3) - 1.0, tent = 1.0 - 0.5 * abs(at);
+        vec2 uv = (vec2(pixel) + 0.5 + 0.67 * radius * at) * view.viewport.zw;
         sum += tent.x * tent.y * textureLod(edge_pyramid, uv, lod).yz;
     }
     return sum.y / sum.x;

@@ -5,8 +5,9 @@
 #include "renderer/techniques/map_params.h"
 
 #define KERNEL_ROW(aggregate)                                                                      \
-    PARAM(aggregate, kernel, .def = 32, .min = 4, .max = 64, .unit = "texel",                      \
-        .help = "Most map texels across the window; wider windows take coarser ones.")
+    PARAM(aggregate, kernel, .def = 8, .min = 4, .max = 64, .unit = "texel",                       \
+        .help = "Map texels across the light's image on each caster's depth: the finest mip level " \
+                "that is walked has at least as many.")
 #define LAYERS_ROW(aggregate)                                                                      \
     PARAM(aggregate, layers, .def = 1, .min = 1, .max = PEEL_MAX_LAYERS, .specialise = 1,          \
         .help = "Depth layers of casters, by depth peeling.")

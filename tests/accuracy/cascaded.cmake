@@ -1,0 +1,2 @@
+penumbra_accuracy_test(cascaded)
+penumbra_accuracy_test(adaptive_sampling)

@@ -89,7 +89,7 @@ char *pen_result_json(const struct pen_result *result, const struct pen_record_e
         pen_json_uint(&json, class_names[c], result->class_pixels[c]);
     pen_json_uint(&json, "full_work", result->full_work_pixels);
     pen_json_array(&json, "subdivided");
-    for (int level = 0; level < 3; level++)
+    for (int level = 0; level < 2; level++)
         pen_json_uint(&json, NULL, result->subdivided_pixels[level]);
     pen_json_end(&json);
     pen_json_end(&json);

@@ -47,11 +47,9 @@ struct pen_result {
     struct pen_pass_time passes[PEN_MAX_PASSES];
     uint32_t scene_was_resident;
     uint32_t shadow_inputs_reused;
-    uint32_t class_pixels[3];  /* lit, penumbra, umbra; all 0 when not classified */
-    uint32_t full_work_pixels; /* pixels for which the method ran in full */
-    /* Receivers whose filter was split 0, 1, 2 times, summed over lights and jittered frames,
-     * without those that the classifier decided; all 0 for methods that split nothing. */
-    uint32_t subdivided_pixels[3];
+    uint32_t class_pixels[3];      /* lit, penumbra, umbra; all 0 when not classified */
+    uint32_t full_work_pixels;     /* pixels for which the method ran in full */
+    uint32_t subdivided_pixels[2]; /* filter split once, twice; over all lights and frames */
     uint32_t triangles_drawn;
     uint32_t shadow_maps; /* depth maps of light samples that the image rests on, drawn or kept;
                              summed over lights and jittered frames */

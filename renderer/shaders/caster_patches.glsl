@@ -45,7 +45,7 @@ PatchWindow patch_window(Surface s)
     // points and contacts get an edge of that width instead of a division by zero.
     float nearest = light_window_scale(min(nearest_z, s.p.z), s.p.z);
     vec2 emitter = max(light.extent, least / max(nearest, 1e-20));
-    float range = (light.far_z - light.near_z) * (light.parallel != 0 ? 1.0 : 1.0 / light.far_z);
+    float range = (light.far_z - light.near_z) * (light_parallel ? 1.0 : 1.0 / light.far_z);
     vec2 unit = range * emitter;
     w.origin = (light.rect.xy - w.q) / unit;
     w.texel = texel / unit;
@@ -77,7 +77,7 @@ float filled_border(PatchWindow w, ivec2 neighbour, int layer, int level, float 
     float its = level > 0 ? texelFetch(min_max_pyramid, ivec3(neighbour, layer), level - 1).r
                           : caster_depth(neighbour, layer);
     // dz / z in hardware depth; a parallel light has no distance, so there it is a share of the range.
-    float scale = light.parallel != 0 ? 1.0 : light.far_z / (light.far_z - light.near_z) - d;
+    float scale = light_parallel ? 1.0 : light.far_z / (light.far_z - light.near_z) - d;
     bool near = its < limit && abs(its - d) < P(gap) * scale;
     float shared_border = border / max(w.depth - its, 1e-20);
 #if P_fill == 1

@@ -42,6 +42,9 @@ static bool record(struct technique_run *run, struct pen_error *error)
         pass_caster_layers(run, params->map_size, params->layers, error);
     if (!layers)
         return false;
+    const struct gl_texture *tiles;
+    if (!patch_tiles(run, params->map_size, params->min_filter, params->mode != 0, &tiles, error))
+        return false;
     struct light_bits *bits = &state->bits[run->face->shape];
     if (params->layers > 1)
         light_bits_fit(bits, 256, (uint32_t)run->face->shape, false);
@@ -52,7 +55,8 @@ static bool record(struct technique_run *run, struct pen_error *error)
         &(struct pass_screen){.name = "accumulation",
             .body = "accumulation.glsl",
             .textures = textures,
-            .texture_count = params->layers > 1 ? 3 : 2},
+            .texture_count = params->layers > 1 ? 3 : 2,
+            .tiles = tiles},
         error);
 }
 

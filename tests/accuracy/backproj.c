@@ -1,6 +1,6 @@
 /* accumulation, backprojection and bitmask against closed forms, and against many samples where
  * there is none. */
-#include "tests/accuracy/harness.h"
+#include "tests/accuracy/textured.h"
 #include "tests/unit/check.h"
 
 #define SMALL_RECT                                                                                 \
@@ -274,6 +274,50 @@ static void check_lights(void)
     }
 }
 
+/* T5 on both axes of the light: sums of emission are exact, points have a colour each. The lit half
+ * light keeps its colours, and a receiver without a caster gets the mean. */
+static void check_colours(void)
+{
+    static const struct {
+        const char *settings;
+        double limit;
+    } cases[] = {
+        {"technique=backprojection&kernel=64&map_size=2048", 0.002},
+        {"technique=backprojection", 0.004},
+        {"technique=backprojection&fill=join&layers=2", 0.004},
+        {"technique=bitmask&samples=256&kernel=64", 0.01},
+        {"technique=bitmask", 0.015},
+        {"technique=bitmask&pattern=regular", 0.04},
+    };
+    for (uint32_t i = 0; i < sizeof cases / sizeof *cases; i++)
+        for (int k = 0; k < 4; k++) {
+            int axis = k >> 1, sign = (k & 1) ? 1 : -1;
+            char light[256];
+            struct shot shot;
+            /* Red is the left half as seen from the scene: the side of the light's -x. */
+            snprintf(light, sizeof light, "%s&light.texture.pattern=two-colour",
+                textured_light(axis, sign));
+            shoot(PEN_GENERATED_HALF_PLANE, cases[i].settings, light, &shot);
+            if (axis == 0) {
+                double worst, rmse = textured_t5(&shot, &wide, sign < 0, &worst);
+                fprintf(stderr, "%-52s T5 %+d rmse %.5f worst %.4f\n", cases[i].settings, sign,
+                    rmse, worst);
+                CHECK(rmse < cases[i].limit);
+            } else {
+                /* The cut runs across the border of the colours: both halves dim alike. */
+                double worst = 0;
+                for (uint32_t p = 0; p < shot.width * shot.height; p++) {
+                    const float *v = shot.visibility + 4 * p;
+                    if (fabsf(shot.position[4 * p + 1]) < 1e-3f)
+                        worst = fmax(worst, (double)fabsf(v[0] - v[1]));
+                }
+                fprintf(stderr, "%-52s T5 across: worst %.4f\n", cases[i].settings, worst);
+                CHECK(worst < 0.04);
+            }
+            harness_shot_finish(&shot);
+        }
+}
+
 int main(void)
 {
     check_planar();
@@ -283,5 +327,6 @@ int main(void)
     check_duplicate();
     check_stacked();
     check_lights();
+    check_colours();
     CHECK_DONE();
 }

@@ -50,9 +50,9 @@ def subdivided(name):
     def value(group):
         found = variant(group, name)
         counts = found and found.get("subdivided_pixels")
-        if not counts or not sum(counts):
+        if not counts:
             return []
-        return [(counts[1] + counts[2]) / (group["width"] * group["height"])]
+        return [sum(counts) / (group["width"] * group["height"])]
     return value
 
 

@@ -174,7 +174,7 @@ static void write_variant(struct pen_json *json, const struct plan_group *group,
         pen_json_double(json, "first_s", picture->seconds);
         pen_json_uint(json, "full_work_pixels", result->full_work_pixels);
         pen_json_array(json, "subdivided_pixels");
-        for (int k = 0; k < 3; k++)
+        for (int k = 0; k < 2; k++)
             pen_json_uint(json, NULL, result->subdivided_pixels[k]);
         pen_json_end(json);
         pen_json_uint(json, "gpu_bytes", result->gpu_bytes);

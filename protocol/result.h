@@ -29,6 +29,13 @@ struct pen_device_info {
     uint32_t software;  /* 1: no GPU behind it */
 };
 
+/* How far a picture is from its reference; see renderer/metrics/metrics.h. */
+struct pen_comparison {
+    double rmse, penumbra_rmse, mean_error, largest; /* of the mean visibility */
+    double ssim, flip;                               /* of the display picture */
+    uint64_t penumbra_pixels;                        /* 0.02 < reference < 0.98 */
+};
+
 struct pen_result {
     struct pen_error error;       /* PEN_OK: there is an image */
     struct pen_request completed; /* camera and lights resolved, modes LOOK_AT / given */
@@ -49,6 +56,7 @@ struct pen_result {
     uint64_t rays;        /* of methods that trace */
     uint64_t gpu_bytes;   /* resident scenes, images and shadow inputs */
     uint64_t image_bytes; /* encoded size */
+    struct pen_comparison comparison; /* all 0 unless a reference was given */
 };
 void pen_result_warn(struct pen_result *result, const char *format, ...)
     __attribute__((format(printf, 2, 3)));

@@ -3,8 +3,8 @@
 // ([-1, 1]^2 or the unit disk), found by F2 of the light frame.
 //
 // The window comes from the bounds of depth in the pyramid, which is then walked as a quadtree: a
-// node without a caster or beside the light ends there, one whose depths barely differ is a single
-// caster, and the finest level is the first with at most P(kernel) texels across the window.
+// node without a caster or beside the light ends there, and one whose depths barely differ, or that
+// is smaller than 1 / P(kernel) of the light as seen past it, is a single caster.
 layout(binding = 7) uniform sampler2DArray caster_maps; // hardware depth, nearest layer first
 #define MIN_MAX_LAYERED
 #include "min_max.glsl"
@@ -45,7 +45,7 @@ PatchWindow patch_window(Surface s)
     // points and contacts get an edge of that width instead of a division by zero.
     float nearest = light_window_scale(min(nearest_z, s.p.z), s.p.z);
     vec2 emitter = max(light.extent, least / max(nearest, 1e-20));
-    float range = (light.far_z - light.near_z) * (light.parallel != 0 ? 1.0 : 1.0 / light.far_z);
+    float range = (light.far_z - light.near_z) * (light_parallel ? 1.0 : 1.0 / light.far_z);
     vec2 unit = range * emitter;
     w.origin = (light.rect.xy - w.q) / unit;
     w.texel = texel / unit;
@@ -77,7 +77,7 @@ float filled_border(PatchWindow w, ivec2 neighbour, int layer, int level, float 
     float its = level > 0 ? texelFetch(min_max_pyramid, ivec3(neighbour, layer), level - 1).r
                           : caster_depth(neighbour, layer);
     // dz / z in hardware depth; a parallel light has no distance, so there it is a share of the range.
-    float scale = light.parallel != 0 ? 1.0 : light.far_z / (light.far_z - light.near_z) - d;
+    float scale = light_parallel ? 1.0 : light.far_z / (light.far_z - light.near_z) - d;
     bool near = its < limit && abs(its - d) < P(gap) * scale;
     float shared_border = border / max(w.depth - its, 1e-20);
 #if P_fill == 1
@@ -96,7 +96,7 @@ void next_node(inout ivec2 at, inout int level)
     at += (at.x & 1) == 0 ? ivec2(1, 0) : ivec2(-1, 1);
 }
 
-void walk_quadtree(inout PatchWindow w, int layer, ivec2 root, int root_level, int finest)
+void walk_quadtree(inout PatchWindow w, int layer, ivec2 root, int root_level)
 {
     ivec2 at = root;
     int level = root_level;
@@ -105,8 +105,9 @@ void walk_quadtree(inout PatchWindow w, int layer, ivec2 root, int root_level, i
         float middle = caster_depth((at << level) + ((1 << level) >> 1), layer);
         vec3 d = texelFetch(min_max_pyramid, ivec3(at, layer), max(level - 1, 0)).rgb;
         d = level > 0 ? d : vec3(middle);
+        // Neighbours compute a common border alike, to the last bit: points must not fall between.
         vec2 low = w.origin + vec2(at << level) * w.texel;
-        vec2 side = float(1 << level) * w.texel, high = low + side;
+        vec2 high = w.origin + vec2((at + 1) << level) * w.texel, side = float(1 << level) * w.texel;
         float plane = min(w.depth + dot(w.gradient, low + 0.5 * side), 1.0);
         float slack = level > 0 ? 0.5 * dot(abs(w.gradient), side) : 0.0;
         // Who lies before the receiver and before its plane hides.
@@ -119,7 +120,10 @@ void walk_quadtree(inout PatchWindow w, int layer, ivec2 root, int root_level, i
         float widest = w.depth - d.x;
         bool beside = any(greaterThan(low, vec2(widest))) || any(lessThan(high, vec2(-widest)));
         bool open = d.x < most && !own && !beside;
-        bool leaf = level == finest || (whole && d.y - d.x <= 0.016 * (w.depth - d.y));
+        // Fine enough for its own shadow: casters near the receiver need finer texels than the
+        // nearest to the light does.
+        bool leaf = level == 0 || max(side.x, side.y) * 0.5 * float(P(kernel)) <= widest ||
+            (whole && d.y - d.x <= 0.016 * (w.depth - d.y));
         if (open && leaf) {
             // Part of a coarse texel: the near depth hides as much as makes the mean of the two
             // depths. Where the plane runs through the texel its middle decides.
@@ -159,9 +163,8 @@ void walk_patches(inout PatchWindow w)
     ivec2 span = last - first + 1;
     float across = float(max(span.x, span.y));
     int coarsest = textureQueryLevels(min_max_pyramid);
-    int finest = clamp(int(ceil(log2(across / float(P(kernel))))), 0, coarsest);
     // Two nodes on each axis hold the window.
-    int root = clamp(int(ceil(log2(across))), finest, coarsest);
+    int root = clamp(int(ceil(log2(across))), 0, coarsest);
     first >>= root;
     last >>= root;
     if (w.answer != PENUMBRA)
@@ -169,5 +172,5 @@ void walk_patches(inout PatchWindow w)
     for (int layer = 0; layer < P(layers); layer++)
         for (int v = first.y; v <= last.y; v++)
             for (int u = first.x; u <= last.x; u++)
-                walk_quadtree(w, layer, ivec2(u, v), root, finest);
+                walk_quadtree(w, layer, ivec2(u, v), root);
 }

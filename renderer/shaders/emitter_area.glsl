@@ -24,7 +24,7 @@ float emitter_share(vec2 low, vec2 high)
 {
     low = clamp(low, -1.0, 1.0);
     high = clamp(high, -1.0, 1.0);
-    if (light.shape == SHAPE_DISK) {
+    if (light_shape == SHAPE_DISK) {
         vec2 x = vec2(low.x, high.x), f = chord_integral(x);
         return (disk_strip(x, f, high.y) - disk_strip(x, f, low.y)) * (1.0 / 3.14159265);
     }

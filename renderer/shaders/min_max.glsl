@@ -7,7 +7,7 @@ layout(binding = 14) uniform sampler2DArray min_max_pyramid;
 vec2 min_max_at(ivec2 at, int level)
 {
     vec2 d = texelFetch(min_max_pyramid, ivec3(at, 0), level).rg;
-    return vec2(light_linear(d.x), light_linear(d.y));
+    return vec2(d.x < 1.0 ? light_linear(d.x) : 1e30, d.y < 1.0 ? light_linear(d.y) : 1e30);
 }
 
 vec2 min_max_size() // of the map, in texels of level 0

@@ -18,7 +18,10 @@ static const struct pen_param rows[] = {
     PARAM(struct accumulation, mode, .def = 1, .choices = mode_names, .specialise = 1,
         .help = "As published, with kernel x kernel points, or with the texels' rectangles clipped "
                 "against the light."),
-    KERNEL_ROW(struct accumulation),
+    PARAM(struct accumulation, kernel, .def = 8, .min = 4, .max = 64, .unit = "texel",
+        .help = "Mode paper: points across the window. Mode clipped: map texels across the light's "
+                "image on each caster's depth; the finest mip level that is walked has at least as "
+                "many."),
     LAYERS_ROW(struct accumulation),
     MIN_FILTER_ROW(struct accumulation),
     PARAM(struct accumulation, window, .choices = window_names, .specialise = 1,
@@ -39,6 +42,9 @@ static bool record(struct technique_run *run, struct pen_error *error)
         pass_caster_layers(run, params->map_size, params->layers, error);
     if (!layers)
         return false;
+    const struct gl_texture *tiles;
+    if (!patch_tiles(run, params->map_size, params->min_filter, params->mode != 0, &tiles, error))
+        return false;
     struct light_bits *bits = &state->bits[run->face->shape];
     if (params->layers > 1)
         light_bits_fit(bits, 256, (uint32_t)run->face->shape, false);
@@ -49,7 +55,8 @@ static bool record(struct technique_run *run, struct pen_error *error)
         &(struct pass_screen){.name = "accumulation",
             .body = "accumulation.glsl",
             .textures = textures,
-            .texture_count = params->layers > 1 ? 3 : 2},
+            .texture_count = params->layers > 1 ? 3 : 2,
+            .tiles = tiles},
         error);
 }
 

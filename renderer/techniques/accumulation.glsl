@@ -20,9 +20,9 @@ void add_patch(vec2 low, vec2 high, float share)
 #elif P_mode == 0
     // The whole caster counts when its centre lies before the light.
     vec2 at = 0.5 * (low + high), size = high - low;
-    bool before = light.shape == SHAPE_DISK ? dot(at, at) < 1.0 : max(abs(at.x), abs(at.y)) < 1.0;
+    bool before = light_shape == SHAPE_DISK ? dot(at, at) < 1.0 : max(abs(at.x), abs(at.y)) < 1.0;
     if (before)
-        hidden_share += size.x * size.y * (light.shape == SHAPE_DISK ? 1.0 / 3.14159265 : 0.25);
+        hidden_share += size.x * size.y * (light_shape == SHAPE_DISK ? 1.0 / 3.14159265 : 0.25);
 #else
     hidden_share += share * emitter_share(low, high);
 #endif

@@ -25,6 +25,9 @@ static bool record(struct technique_run *run, struct pen_error *error)
                                                 run, params->map_size, params->layers, error);
     if (!layers || (run->face->textured && !(sums = pass_emission_sat(run, error))))
         return false;
+    const struct gl_texture *tiles;
+    if (!patch_tiles(run, params->map_size, params->min_filter, true, &tiles, error))
+        return false;
     struct pass_texture textures[] = {{UNIT_FREE, layers->textures[0].name, GL_SAMPLE_NEAREST},
         {UNIT_MIN_MAX, layers->textures[1].name, GL_SAMPLE_NEAREST},
         {UNIT_FREE + 2, sums ? sums->textures[0].name : 0, GL_SAMPLE_LINEAR}};
@@ -33,7 +36,8 @@ static bool record(struct technique_run *run, struct pen_error *error)
             .body = "backprojection.glsl",
             .defines = sums ? "#define TEXTURED\n" : NULL,
             .textures = textures,
-            .texture_count = sums ? 3 : 2},
+            .texture_count = sums ? 3 : 2,
+            .tiles = tiles},
         error);
 }
 

@@ -70,6 +70,9 @@ static bool record(struct technique_run *run, struct pen_error *error)
         pass_caster_layers(run, params->map_size, params->layers, error);
     if (!layers)
         return false;
+    const struct gl_texture *tiles;
+    if (!patch_tiles(run, params->map_size, params->min_filter, true, &tiles, error))
+        return false;
     struct light_bits *bits = &state->bits[run->face->shape];
     light_bits_fit(bits, params->samples ? 256 : 64, (uint32_t)run->face->shape, jittered);
     if (textured && !sample_emission(run, bits, error))
@@ -82,7 +85,8 @@ static bool record(struct technique_run *run, struct pen_error *error)
         .body = "bitmask.glsl",
         .defines = textured ? "#define TEXTURED\n" : NULL,
         .textures = textures,
-        .texture_count = textured ? 4 : 3};
+        .texture_count = textured ? 4 : 3,
+        .tiles = tiles};
     return params->smooth.on && jittered && !textured ? pass_interleaved(run, &pass, error)
                                                       : pass_screen(run, &pass, error);
 }

@@ -47,7 +47,7 @@ vec4 visibility(Surface s)
     float lit = w.answer == UMBRA ? 0.0 : bits_lit_share();
 #ifdef INTERLEAVED
     // Width on the screen, F5, of the sharpest shadow here, for the averaging pass.
-    float scale = light.parallel != 0 ? 1.0 : s.p.z / light.near_z;
+    float scale = light_parallel ? 1.0 : s.p.z / light.near_z;
     float width = 2.0 * w.reach.x * min(w.narrowest / w.widest, 1.0);
     float pixels = width * scale * view.eye.w * s.depth / view.forward.w;
     return vec4(lit, lit < 1.0 ? pixels : 0.0, 0.0, 1.0);

@@ -1,12 +1,14 @@
 /* Rows of the methods that take the map's texels for casters (caster_patches.glsl). */
 #pragma once
-#include "renderer/passes/passes.h"
+#include "renderer/passes/classify.h"
 #include "renderer/passes/peel.h"
 #include "renderer/techniques/map_params.h"
 
 #define KERNEL_ROW(aggregate)                                                                      \
-    PARAM(aggregate, kernel, .def = 32, .min = 4, .max = 64, .unit = "texel",                      \
-        .help = "Most map texels across the window; wider windows take coarser ones.")
+    PARAM(aggregate, kernel, .def = 8, .min = 4, .max = 64, .unit = "texel",                       \
+        .help =                                                                                    \
+            "Map texels across the light's image on each caster's depth: the finest mip level "    \
+            "that is walked has at least as many.")
 #define LAYERS_ROW(aggregate)                                                                      \
     PARAM(aggregate, layers, .def = 1, .min = 1, .max = PEEL_MAX_LAYERS, .specialise = 1,          \
         .help = "Depth layers of casters, by depth peeling.")
@@ -23,3 +25,18 @@
         .help = "Depth step up to which neighbours are one surface, as a fraction of the depth.")
 
 static const char *const patch_fill_names[] = {"none", "extend", "join", NULL};
+
+/* *tiles: where the answer is open, for pass_screen; NULL when the request wants every pixel. */
+static inline bool patch_tiles(struct technique_run *run, uint32_t map_size, float min_filter,
+    bool umbra, const struct gl_texture **tiles, struct pen_error *error)
+{
+    *tiles = NULL;
+    if (!run->request->classify.on)
+        return true;
+    const struct shadow_input *min_max = pass_caster_min_max(run, map_size, error);
+    if (!min_max)
+        return false;
+    *tiles = umbra ? pass_classify(run, min_max, min_filter + 1, error)
+                   : pass_classify_lit(run, min_max, min_filter + 1, error);
+    return *tiles != NULL;
+}

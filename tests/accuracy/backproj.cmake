@@ -1,1 +1,2 @@
 penumbra_accuracy_test(backproj)
+target_sources(accuracy_backproj PRIVATE textured.c)

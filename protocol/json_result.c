@@ -14,7 +14,7 @@ static uint32_t least(uint32_t a, uint32_t b)
     return a < b ? a : b;
 }
 
-static void write_device(struct pen_json *json, const struct pen_device_info *device)
+void pen_result_write_device(struct pen_json *json, const struct pen_device_info *device)
 {
     pen_json_object(json, "device");
     pen_json_string(json, "renderer", device->renderer);
@@ -24,7 +24,7 @@ static void write_device(struct pen_json *json, const struct pen_device_info *de
     pen_json_end(json);
 }
 
-static void write_times(struct pen_json *json, const struct pen_result *result)
+void pen_result_write_times(struct pen_json *json, const struct pen_result *result)
 {
     pen_json_object(json, "stages_ms");
     for (uint32_t s = 0; s < PEN_STAGES; s++)
@@ -71,21 +71,25 @@ char *pen_result_json(const struct pen_result *result, const struct pen_record_e
     pen_json_array(&json, "warnings");
     for (uint32_t w = 0; w < least(result->warning_count, PEN_MAX_WARNINGS); w++)
         pen_json_string(&json, NULL, result->warnings[w]);
+    if (extra->choice && !extra->choice_met)
+        pen_json_string(&json, NULL, extra->choice);
     pen_json_end(&json);
-    write_device(&json, &result->device);
+    if (extra->choice)
+        pen_json_string(&json, "choice", extra->choice);
+    pen_result_write_device(&json, &result->device);
     pen_json_object(&json, "cache");
     pen_json_bool(&json, "result", extra->from_cache);
     pen_json_bool(&json, "scene_resident", result->scene_was_resident);
     pen_json_bool(&json, "shadow_inputs_reused", result->shadow_inputs_reused);
     pen_json_end(&json);
     write_ms(&json, "total_ms", extra->total_ms);
-    write_times(&json, result);
+    pen_result_write_times(&json, result);
     pen_json_object(&json, "pixels");
     for (int c = 0; c < 3; c++)
         pen_json_uint(&json, class_names[c], result->class_pixels[c]);
     pen_json_uint(&json, "full_work", result->full_work_pixels);
     pen_json_array(&json, "subdivided");
-    for (int level = 0; level < 3; level++)
+    for (int level = 0; level < 2; level++)
         pen_json_uint(&json, NULL, result->subdivided_pixels[level]);
     pen_json_end(&json);
     pen_json_end(&json);

@@ -20,14 +20,20 @@ struct pen_record_extra {
     const char *request_id;
     const char *image_href; /* where the image can be fetched */
     const char *etag;
-    double total_ms; /* from the last byte of the request to the record */
-    bool from_cache; /* the image was not rendered for this request */
+    double total_ms;    /* from the last byte of the request to the record */
+    bool from_cache;    /* the image was not rendered for this request */
+    const char *choice; /* why this method was taken, when the request left that open */
+    bool choice_met;    /* false: nothing meets what was asked */
 };
 
 /* The full record of a render: the request as completed, warnings, device, cache hits, times per
  * stage and per pass, counts. `extra` may be NULL. */
 char *pen_result_json(const struct pen_result *result, const struct pen_record_extra *extra,
     const struct pen_catalogue *catalogue);
+
+/* Parts of it: "device", and "stages_ms" with "passes". */
+void pen_result_write_device(struct pen_json *json, const struct pen_device_info *device);
+void pen_result_write_times(struct pen_json *json, const struct pen_result *result);
 
 /* The Server-Timing header's value, "queue;dur=0.1, load;dur=0, ..."; at most `bytes` with the NUL.
  */

@@ -34,6 +34,8 @@ static void write_content(struct pen_json *json, enum pen_body body)
         [PEN_BODY_IMAGES] = SCHEMA "ImageList",
         [PEN_BODY_IMAGE_INFO] = SCHEMA "ImageInfo",
         [PEN_BODY_STATS] = NULL,
+        [PEN_BODY_COMPARE] = SCHEMA "CompareRequest",
+        [PEN_BODY_COMPARISON] = SCHEMA "Comparison",
     };
     pen_json_object(json, "content");
     switch (body) {
@@ -64,10 +66,11 @@ static void write_image_headers(struct pen_json *json)
     static const char *const headers[][2] = {
         {"ETag", "Strong; the same request gives the same image."},
         {"Server-Timing", "Milliseconds per stage."},
+        {"X-Penumbra-Choice", "Why this method was taken, when auto was asked for."},
         {"X-Penumbra-Warning", "What the method could not do; once per warning."},
     };
     pen_json_object(json, "headers");
-    for (int i = 0; i < 3; i++) {
+    for (int i = 0; i < 4; i++) {
         pen_json_object(json, headers[i][0]);
         pen_json_string(json, "description", headers[i][1]);
         pen_json_raw(json, "schema", "{\"type\":\"string\"}");

@@ -277,6 +277,34 @@ static void write_request(struct pen_json *json)
     close_object(json);
 }
 
+/* Rows that a render request has too. */
+static void write_row_refs(struct pen_json *json, struct pen_param_table table)
+{
+    for (uint32_t r = 0; r < table.count; r++) {
+        char target[96];
+        snprintf(target, sizeof target, SCHEMA "RenderRequest/properties/%s", table.rows[r].name);
+        write_ref(json, table.rows[r].name, target);
+    }
+}
+
+static void write_compare(struct pen_json *json)
+{
+    open_object(
+        json, "CompareRequest", "A render request with a list of methods; {} compares all.");
+    pen_json_raw(json, "techniques",
+        "{\"description\":\"all: every method with its defaults.\",\"default\":\"all\",\"oneOf\":[{"
+        "\"const\":\"all\"},{\"type\":\"array\",\"minItems\":1,\"maxItems\":32,\"items\":{"
+        "\"$ref\":\"" SCHEMA "Technique\"}}]}");
+    pen_json_raw(json, "reference",
+        "{\"description\":\"Left out: raytraced with 1024 samples.\",\"$ref\":\"" SCHEMA
+        "Technique\"}");
+    write_ref(json, "camera", SCHEMA "Camera");
+    write_ref(json, "lights", SCHEMA "RenderRequest/properties/lights");
+    write_row_refs(json, pen_request_table());
+    write_row_refs(json, pen_delivery_table());
+    close_object(json);
+}
+
 /* Documents that only come back: their shape, as JSON text. */
 static const char *const answers[][2] = {
     {"Problem",
@@ -329,6 +357,33 @@ static const char *const answers[][2] = {
         "\"boolean\"},\"params\":{\"type\":\"array\",\"items\":{\"type\":\"object\"}}}}"},
     {"TechniqueList", "{\"type\":\"object\",\"properties\":{\"techniques\":{\"type\":\"array\","
                       "\"items\":{\"$ref\":\"" SCHEMA "TechniqueInfo\"}}}}"},
+    {"ComparedMethod",
+        "{\"type\":\"object\",\"description\":\"Errors are of the mean visibility, ssim and flip "
+        "of "
+        "the display picture. A method that failed has only "
+        "error.\",\"properties\":{\"technique\":{"
+        "\"$ref\":\"" SCHEMA
+        "TechniqueObject\"},\"error\":{\"type\":\"string\"},\"rmse\":{\"type\":\"number\"},"
+        "\"rmse_penumbra\":{\"type\":[\"number\",\"null\"],\"description\":\"Where the reference "
+        "lies between 0.02 and 0.98; null: nowhere.\"},\"mean_error\":{\"type\":\"number\"},"
+        "\"largest_error\":{\"type\":\"number\"},\"ssim\":{\"type\":\"number\"},\"flip\":{"
+        "\"type\":\"number\"},\"penumbra_pixels\":{\"type\":\"integer\"},\"total_ms\":{\"type\":"
+        "\"number\",\"description\":\"G-buffer, shadow inputs, method and shading, with nothing "
+        "cached.\"},\"shadow_ms\":{\"type\":\"number\",\"description\":\"Shadow inputs and "
+        "method.\"},\"stages_ms\":{\"type\":\"object\",\"additionalProperties\":{\"type\":"
+        "\"number\"}},\"passes\":{\"type\":\"array\",\"items\":{\"type\":\"object\"}},\"warnings\":"
+        "{\"type\":\"array\",\"items\":{\"type\":\"string\"}},\"links\":{\"type\":\"object\","
+        "\"properties\":{\"image\":{\"type\":\"string\"},\"difference\":{\"type\":\"string\","
+        "\"description\":\"White: equal, red: too light, blue: too dark.\"},\"ssim_map\":{\"type\":"
+        "\"string\"},\"flip_map\":{\"type\":\"string\"}}}}}"},
+    {"Comparison",
+        "{\"type\":\"object\",\"required\":[\"scene\",\"request\",\"device\",\"warnings\","
+        "\"reference\",\"methods\"],\"properties\":{\"request_id\":{\"type\":\"string\"},\"scene\":"
+        "{\"$ref\":\"" SCHEMA "Id\"},\"request\":{\"$ref\":\"" SCHEMA
+        "RenderRequest\"},\"device\":{\"type\":\"object\"},\"warnings\":{\"type\":\"array\","
+        "\"items\":{\"type\":\"string\"}},\"reference\":{\"$ref\":\"" SCHEMA
+        "ComparedMethod\"},\"methods\":{\"type\":\"array\",\"items\":{\"$ref\":\"" SCHEMA
+        "ComparedMethod\"}},\"total_ms\":{\"type\":\"number\"}}}"},
     {"Record",
         "{\"type\":\"object\",\"description\":\"How an image was made.\",\"required\":[\"scene\","
         "\"request\",\"warnings\",\"device\"],\"properties\":{\"request_id\":{\"type\":\"string\"},"
@@ -337,7 +392,9 @@ static const char *const answers[][2] = {
         "{\"type\":\"string\"},\"type\":{\"type\":\"string\"},\"width\":{\"type\":\"integer\"},"
         "\"height\":{\"type\":\"integer\"},\"bytes\":{\"type\":\"integer\"}}},\"warnings\":{"
         "\"type\":"
-        "\"array\",\"items\":{\"type\":\"string\"}},\"device\":{\"type\":\"object\",\"properties\":"
+        "\"array\",\"items\":{\"type\":\"string\"}},\"choice\":{\"type\":\"string\","
+        "\"description\":\"Why this method, when auto was asked "
+        "for.\"},\"device\":{\"type\":\"object\",\"properties\":"
         "{\"renderer\":{\"type\":\"string\"},\"version\":{\"type\":\"string\"},\"platform\":{"
         "\"type\":"
         "\"string\"},\"software\":{\"type\":\"boolean\"}}},\"cache\":{\"type\":\"object\","
@@ -357,6 +414,7 @@ static const char *const answers[][2] = {
 void pen_openapi_schemas(struct pen_json *json, const struct pen_catalogue *catalogue)
 {
     write_request(json);
+    write_compare(json);
     write_techniques(json, catalogue);
     write_camera(json);
     write_light(json);

@@ -29,6 +29,13 @@ struct pen_device_info {
     uint32_t software;  /* 1: no GPU behind it */
 };
 
+/* How far a picture is from its reference; see renderer/metrics/metrics.h. */
+struct pen_comparison {
+    double rmse, penumbra_rmse, mean_error, largest; /* of the mean visibility */
+    double ssim, flip;                               /* of the display picture */
+    uint64_t penumbra_pixels;                        /* 0.02 < reference < 0.98 */
+};
+
 struct pen_result {
     struct pen_error error;       /* PEN_OK: there is an image */
     struct pen_request completed; /* camera and lights resolved, modes LOOK_AT / given */
@@ -40,17 +47,16 @@ struct pen_result {
     struct pen_pass_time passes[PEN_MAX_PASSES];
     uint32_t scene_was_resident;
     uint32_t shadow_inputs_reused;
-    uint32_t class_pixels[3];  /* lit, penumbra, umbra; all 0 when not classified */
-    uint32_t full_work_pixels; /* pixels for which the method ran in full */
-    /* Receivers whose filter was split 0, 1, 2 times, summed over lights and jittered frames,
-     * without those that the classifier decided; all 0 for methods that split nothing. */
-    uint32_t subdivided_pixels[3];
+    uint32_t class_pixels[3];      /* lit, penumbra, umbra; all 0 when not classified */
+    uint32_t full_work_pixels;     /* pixels for which the method ran in full */
+    uint32_t subdivided_pixels[2]; /* filter split once, twice; over all lights and frames */
     uint32_t triangles_drawn;
     uint32_t shadow_maps; /* depth maps of light samples that the image rests on, drawn or kept;
                              summed over lights and jittered frames */
     uint64_t rays;        /* of methods that trace */
     uint64_t gpu_bytes;   /* resident scenes, images and shadow inputs */
     uint64_t image_bytes; /* encoded size */
+    struct pen_comparison comparison; /* all 0 unless a reference was given */
 };
 void pen_result_warn(struct pen_result *result, const char *format, ...)
     __attribute__((format(printf, 2, 3)));

@@ -17,6 +17,7 @@ enum pen_route_id {
     PEN_ROUTE_SCENE_DELETE, /* DELETE /v1/scenes/{id} */
     PEN_ROUTE_RENDER,       /* GET /v1/scenes/{id}/render */
     PEN_ROUTE_RENDER_POST,  /* POST /v1/scenes/{id}/render */
+    PEN_ROUTE_COMPARE,      /* POST /v1/scenes/{id}/compare */
     PEN_ROUTE_IMAGES,       /* GET /v1/images */
     PEN_ROUTE_IMAGE_POST,   /* POST /v1/images */
     PEN_ROUTE_IMAGE,        /* GET /v1/images/{id} */
@@ -31,6 +32,7 @@ enum pen_route_id {
 enum pen_body {
     PEN_BODY_NONE,
     PEN_BODY_REQUEST,      /* a render request */
+    PEN_BODY_COMPARE,      /* what to compare */
     PEN_BODY_SCENE_UPLOAD, /* model/gltf-binary, multipart/form-data, application/zip */
     PEN_BODY_IMAGE_UPLOAD, /* image/png, image/jpeg, image/webp */
     PEN_BODY_IMAGE,        /* a rendered image, or the record when JSON is accepted */
@@ -43,6 +45,7 @@ enum pen_body {
     PEN_BODY_IMAGES,
     PEN_BODY_IMAGE_INFO,
     PEN_BODY_STATS,
+    PEN_BODY_COMPARISON,
 };
 
 enum pen_route_flags {

@@ -29,22 +29,6 @@ static void set_axes(
     memcpy(f->world_to_light, m, sizeof m);
 }
 
-/* World bounds of one instance: of its primitive's box, transformed (exact for a box). */
-static void instance_bounds(
-    const struct psc_scene *blob, uint32_t instance, float min[3], float max[3])
-{
-    const float *m = blob->instances[instance].world;
-    const struct psc_primitive *p = &blob->primitives[blob->instances[instance].primitive];
-    for (int row = 0; row < 3; row++) {
-        min[row] = max[row] = m[4 * row + 3];
-        for (int k = 0; k < 3; k++) {
-            float a = m[4 * row + k] * p->bounds_min[k], b = m[4 * row + k] * p->bounds_max[k];
-            min[row] += fminf(a, b);
-            max[row] += fmaxf(a, b);
-        }
-    }
-}
-
 /* A flat floor or wall on the far side of the bounds has everything else between itself and the
  * light: it receives, but it casts on nothing, and need not widen the map's window. */
 static bool is_backdrop(const struct scene *scene, const float min[3], const float max[3],
@@ -69,7 +53,7 @@ void light_find_backdrops(const struct light *light, const struct scene *scene, 
     bool sun = light->source->type == PEN_LIGHT_SUN;
     for (uint32_t i = 0; i < scene->blob.instance_count; i++) {
         float min[3], max[3];
-        instance_bounds(&scene->blob, i, min, max);
+        scene_instance_bounds(scene, i, min, max);
         backdrop[i] = is_backdrop(scene, min, max, light->origin, sun ? light->z : NULL);
     }
 }
@@ -82,7 +66,7 @@ static void caster_bounds(const struct scene *scene, const struct light *light, 
     bool sun = light->source->type == PEN_LIGHT_SUN;
     for (uint32_t i = 0; i < scene->blob.instance_count; i++) {
         float min[3], max[3];
-        instance_bounds(&scene->blob, i, min, max);
+        scene_instance_bounds(scene, i, min, max);
         if (is_backdrop(scene, min, max, light->origin, sun ? light->z : NULL))
             continue;
         for (int k = 0; k < 3; k++) {
@@ -108,46 +92,71 @@ static void light_corner(const struct light_face *f, const float bounds[2][3], i
     glm_mat4_mulv3((vec4 *)f->world_to_light, world, 1, c);
 }
 
-static void box_range(const struct light_face *f, const float bounds[2][3], float range[2])
+/* Extent of a world box along one axis of light space. */
+static void box_range(
+    const struct light_face *f, const float bounds[2][3], int axis, float range[2])
 {
     range[0] = INFINITY, range[1] = -INFINITY;
     for (int i = 0; i < 8; i++) {
         float c[3];
         light_corner(f, bounds, i, c);
-        range[0] = fminf(range[0], c[2]);
-        range[1] = fmaxf(range[1], c[2]);
+        range[0] = fminf(range[0], c[axis]);
+        range[1] = fmaxf(range[1], c[axis]);
     }
 }
 
+/* Row `axis` of world_to_light * world; returns its length: what it makes of a unit sphere. */
+static float light_row(
+    const struct light_face *f, const struct psc_instance *instance, int axis, float row[4])
+{
+    for (int k = 0; k < 4; k++)
+        row[k] = f->world_to_light[0][axis] * instance->world[k] +
+                 f->world_to_light[1][axis] * instance->world[4 + k] +
+                 f->world_to_light[2][axis] * instance->world[8 + k] +
+                 (k == 3 ? f->world_to_light[3][axis] : 0);
+    return sqrtf(row[0] * row[0] + row[1] * row[1] + row[2] * row[2]);
+}
+
+static float across(const float row[4], const float p[3])
+{
+    return row[0] * p[0] + row[1] * p[1] + row[2] * p[2] + row[3];
+}
+
 /* Nearest and farthest z of what lies in front of the light: by instance box and by meshlet sphere,
- * whichever is tighter. A near plane that is too close widens every blocker search. */
+ * whichever is tighter. A near plane that is too close widens every blocker search. A face of a
+ * cube only owns receivers with |x|, |y| <= z, so what is nearer than |x| or |y| less the emitter's
+ * half extent casts on none of them. */
 static void geometry_range(const struct light_face *f, const struct scene *scene, float range[2])
 {
     range[0] = INFINITY, range[1] = 0;
     for (uint32_t i = 0; i < scene->blob.instance_count; i++) {
         const struct psc_instance *instance = &scene->blob.instances[i];
         const struct psc_primitive *p = &scene->blob.primitives[instance->primitive];
-        float bounds[2][3], box[2], row[4];
-        instance_bounds(&scene->blob, i, bounds[0], bounds[1]);
-        box_range(f, bounds, box);
-        for (int k = 0; k < 4; k++) /* row z of world_to_light * world */
-            row[k] = f->world_to_light[0][2] * instance->world[k] +
-                     f->world_to_light[1][2] * instance->world[4 + k] +
-                     f->world_to_light[2][2] * instance->world[8 + k] +
-                     (k == 3 ? f->world_to_light[3][2] : 0);
-        float scale = sqrtf(row[0] * row[0] + row[1] * row[1] + row[2] * row[2]);
+        float bounds[2][3], box[3][2], rows[3][4], scales[3];
+        scene_instance_bounds(scene, i, bounds[0], bounds[1]);
+        for (int axis = 0; axis < 3; axis++) {
+            box_range(f, bounds, axis, box[axis]);
+            scales[axis] = light_row(f, instance, axis, rows[axis]);
+        }
         for (uint32_t k = 0; k < p->meshlet_count; k++) {
             const struct psc_meshlet *m = &scene->blob.meshlets[p->first_meshlet + k];
-            float z =
-                row[0] * m->center[0] + row[1] * m->center[1] + row[2] * m->center[2] + row[3];
-            float near_z = fmaxf(z - scale * m->radius, box[0]);
-            float far_z = fminf(z + scale * m->radius, box[1]);
+            float z = across(rows[2], m->center);
+            float near_z = fmaxf(z - scales[2] * m->radius, box[2][0]);
+            float far_z = fminf(z + scales[2] * m->radius, box[2][1]);
             if (far_z <= 0)
                 continue;
-            range[0] = fminf(range[0], near_z);
             range[1] = fmaxf(range[1], far_z);
+            for (int axis = 0; f->cube && axis < 2; axis++) {
+                float beside = fabsf(across(rows[axis], m->center)) - scales[axis] * m->radius;
+                beside = fmaxf(beside, fmaxf(box[axis][0], -box[axis][1]));
+                near_z = fmaxf(near_z, beside - f->half[axis]);
+            }
+            if (near_z <= far_z)
+                range[0] = fminf(range[0], near_z);
         }
     }
+    if (range[1] > 0 && range[0] > range[1]) /* geometry, but none that could cast */
+        range[0] = 0.5f * range[1];
 }
 
 static void fit_range(struct light_face *f, const struct scene *scene)

@@ -162,7 +162,7 @@ static void evict(struct pen_renderer *r, const struct scene *keep)
         uint64_t scenes = scene_bytes(r), least = UINT64_MAX;
         /* Shadow inputs are cheaper to make again than scenes are to upload. */
         shadow_cache_trim(r->ctx.shadows, r->budget > scenes ? r->budget - scenes : 0);
-        if (scenes <= r->budget && r->scene_count < MAX_RESIDENT)
+        if (pen_renderer_gpu_bytes(r) <= r->budget && r->scene_count < MAX_RESIDENT)
             return;
         uint32_t oldest = UINT32_MAX;
         for (uint32_t i = 0; i < r->scene_count; i++)
@@ -277,6 +277,12 @@ fail:
     if (error)
         result->error = *error;
     return false;
+}
+
+void pen_renderer_drop_shadows(struct pen_renderer *r)
+{
+    shadow_cache_begin_frame(r->ctx.shadows); /* the last frame's inputs may go too */
+    shadow_cache_trim(r->ctx.shadows, 0);
 }
 
 bool pen_renderer_is_lost(struct pen_renderer *r)

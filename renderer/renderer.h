@@ -68,6 +68,8 @@ void pen_frame_finish(struct pen_frame *frame);
  * asks what this scene does not have (camera 7 of 3). PEN_INTERNAL with a lost context: destroy. */
 bool pen_renderer_render(struct pen_renderer *renderer, const struct pen_request *request,
     struct pen_frame *frame, struct pen_result *result, struct pen_error *error);
+/* Forgets every shadow input, so that the next render pays for its own. */
+void pen_renderer_drop_shadows(struct pen_renderer *renderer);
 /* True when the GL context was lost; the worker then exits and is replaced. */
 bool pen_renderer_is_lost(struct pen_renderer *renderer);
 

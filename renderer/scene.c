@@ -224,6 +224,8 @@ static void make_groups(struct scene *s)
     gl.CreateBuffers(1, &s->commands);
 }
 
+static void find_content(struct scene *s);
+
 static struct scene *upload(struct scene *s, struct pen_error *error)
 {
     while (gl.GetError() != GL_NO_ERROR)
@@ -238,6 +240,7 @@ static struct scene *upload(struct scene *s, struct pen_error *error)
     s->depth_array = make_array(s, false);
     s->full_array = make_array(s, true);
     make_groups(s);
+    find_content(s);
     if (gl.GetError() != GL_NO_ERROR) {
         pen_fail(error, PEN_INTERNAL, "", "The GPU has no memory left for this scene.");
         scene_destroy(s);
@@ -309,7 +312,7 @@ float scene_radius(const struct scene *s)
         return 1;
     float sum = 0;
     for (int i = 0; i < 3; i++) {
-        float d = s->blob.header->bounds_max[i] - s->blob.header->bounds_min[i];
+        float d = s->content[1][i] - s->content[0][i];
         sum += d * d;
     }
     return fmaxf(0.5f * sqrtf(sum), 1e-4f);
@@ -318,9 +321,45 @@ float scene_radius(const struct scene *s)
 void scene_center(const struct scene *s, float center[3])
 {
     for (int i = 0; i < 3; i++)
-        center[i] = scene_is_empty(s)
-                        ? 0
-                        : 0.5f * (s->blob.header->bounds_min[i] + s->blob.header->bounds_max[i]);
+        center[i] = scene_is_empty(s) ? 0 : 0.5f * (s->content[0][i] + s->content[1][i]);
+}
+
+void scene_instance_bounds(const struct scene *s, uint32_t instance, float min[3], float max[3])
+{
+    const float *m = s->blob.instances[instance].world;
+    const struct psc_primitive *p = &s->blob.primitives[s->blob.instances[instance].primitive];
+    for (int row = 0; row < 3; row++) {
+        min[row] = max[row] = m[4 * row + 3];
+        for (int k = 0; k < 3; k++) {
+            float a = m[4 * row + k] * p->bounds_min[k], b = m[4 * row + k] * p->bounds_max[k];
+            min[row] += fminf(a, b);
+            max[row] += fmaxf(a, b);
+        }
+    }
+}
+
+static void find_content(struct scene *s)
+{
+    const struct psc_header *h = s->blob.header;
+    float flat = 1e-4f * (h->bounds_max[1] - h->bounds_min[1]);
+    bool any = false;
+    for (uint32_t i = 0; i < s->blob.instance_count; i++) {
+        float min[3], max[3];
+        scene_instance_bounds(s, i, min, max);
+        if (max[1] <= h->bounds_min[1] + flat)
+            continue; /* a floor at the very bottom */
+        for (int k = 0; k < 3; k++) {
+            s->content[0][k] = any ? fminf(s->content[0][k], min[k]) : min[k];
+            s->content[1][k] = any ? fmaxf(s->content[1][k], max[k]) : max[k];
+        }
+        any = true;
+    }
+    if (any) {
+        s->content[0][1] = h->bounds_min[1]; /* it stands on that floor */
+        return;
+    }
+    memcpy(s->content[0], h->bounds_min, sizeof s->content[0]);
+    memcpy(s->content[1], h->bounds_max, sizeof s->content[1]);
 }
 
 static void bind_material(struct scene *s, uint32_t material)

@@ -24,6 +24,7 @@ struct scene {
     struct scene_group *groups;
     uint32_t group_count;
     struct cull_command *command_room;
+    float content[2][3]; /* world bounds without a flat floor that everything stands on */
     bool has_emission, has_unlit;
     bool has_gloss; /* some roughness is below 0.5 */
     uint64_t bytes;
@@ -40,8 +41,13 @@ struct scene *scene_create_memory(
 void scene_destroy(struct scene *scene);
 
 bool scene_is_empty(const struct scene *scene);
-float scene_radius(const struct scene *scene); /* of the sphere around the bounds, m; >= 1e-4 */
+/* Of the sphere around the content, m; >= 1e-4. Cameras and lights are chosen to suit it: a floor
+ * may be any size. */
+float scene_radius(const struct scene *scene);
 void scene_center(const struct scene *scene, float center[3]);
+/* World bounds of one instance: of its primitive's box, transformed. */
+void scene_instance_bounds(
+    const struct scene *scene, uint32_t instance, float min[3], float max[3]);
 
 /* The two programs of a geometry pass: `opaque` without texture access, `textured` for groups that
  * need it (alpha tests, and all textured materials when `full`). */

@@ -31,9 +31,7 @@ static float framing_distance(const struct scene *scene, const float center[3],
     for (int i = 0; i < 8; i++) {
         float d[3];
         for (int k = 0; k < 3; k++)
-            d[k] = (i >> k & 1 ? scene->blob.header->bounds_max[k]
-                               : scene->blob.header->bounds_min[k]) -
-                   center[k];
+            d[k] = scene->content[i >> k & 1][k] - center[k];
         float toward = glm_vec3_dot(d, (float *)direction);
         least = fmaxf(least, toward + fabsf(glm_vec3_dot(d, right)) / tan_x);
         least = fmaxf(least, toward + fabsf(glm_vec3_dot(d, up)) / tan_y);

@@ -18,6 +18,15 @@ const char *picture_build(void)
     return build;
 }
 
+static void hash_bytes(const void *data, size_t size, char tag[PEN_ID_HEX + 1])
+{
+    struct hash *hash = hash_create();
+    uint8_t digest[PEN_ID_BYTES];
+    hash_add(hash, data, size);
+    hash_finish(hash, digest);
+    pen_id_to_hex(digest, tag);
+}
+
 struct picture *picture_create(
     int memfd, const struct pen_result *result, const char *tag, struct pen_error *error)
 {
@@ -41,7 +50,10 @@ struct picture *picture_create(
     picture->data = data;
     picture->size = size;
     picture->result = *result;
-    memcpy(picture->tag, tag, sizeof picture->tag);
+    if (tag)
+        memcpy(picture->tag, tag, sizeof picture->tag);
+    else
+        hash_bytes(data, size, picture->tag);
     picture->references = 1;
     return picture;
 }

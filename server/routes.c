@@ -25,6 +25,7 @@ static const struct handler handlers[ROUTE_NONE] = {
     [PEN_ROUTE_SCENE_DELETE] = {routes_delete},
     [PEN_ROUTE_RENDER] = {routes_render},
     [PEN_ROUTE_RENDER_POST] = {routes_render},
+    [PEN_ROUTE_COMPARE] = {routes_compare},
     [PEN_ROUTE_IMAGES] = {routes_list},
     [PEN_ROUTE_IMAGE_POST] = {routes_import},
     [PEN_ROUTE_IMAGE] = {routes_describe},
@@ -56,7 +57,8 @@ static void add_common(struct call *call)
     if (*origin) {
         http_add_header(x, "Access-Control-Allow-Origin", "%s", origin);
         http_add_header(x, "Access-Control-Expose-Headers",
-            "ETag, Server-Timing, Location, Retry-After, X-Request-Id, Content-Location");
+            "ETag, Server-Timing, Location, Retry-After, X-Request-Id, Content-Location, "
+            "X-Penumbra-Choice, X-Penumbra-Warning");
     }
 }
 
@@ -228,7 +230,7 @@ static bool check_body(struct call *call, struct pen_error *error)
     struct http_exchange *x = call->exchange;
     uint8_t takes =
         call->route < PEN_ROUTES ? pen_routes[call->route].takes : (uint8_t)PEN_BODY_NONE;
-    if (takes != PEN_BODY_REQUEST)
+    if (takes != PEN_BODY_REQUEST && takes != PEN_BODY_COMPARE)
         return true;
     const char *type = http_header(x, "Content-Type");
     size_t length = type ? strcspn(type, "; ") : 0;
@@ -330,6 +332,7 @@ static void completed(struct http_exchange *x)
         .error = *call->error ? call->error : NULL,
         .aborted = x->aborted};
     log_write_request(&line);
+    free(call->compare);
     free(call->text);
     free(call);
 }

@@ -28,6 +28,12 @@ struct call {
     struct pen_request request;
     struct waiter waiter;
     bool holds_share, wants_record, is_cached;
+    struct pen_compare *compare;
+    struct call *next_waiting; /* for a calibration */
+    char choice[256];          /* why this method was taken */
+    uint8_t choice_key[PEN_ID_BYTES];
+    double choice_ms; /* expected */
+    bool choice_met, is_deferred;
     /* For the log: */
     const char *technique;
     double queue_ms, render_ms;
@@ -49,6 +55,15 @@ bool routes_begin_upload(struct call *call); /* at the header: false when it has
 void routes_import(struct call *call);
 void routes_render(struct call *call);
 void routes_result(struct call *call);
+void routes_compare(struct call *call);
+/* Takes a method for a request that asks for "auto", and goes on with routes_serve; at once, or
+ * when the scene has been measured. */
+void routes_auto(struct call *call);
+/* A complete render request: from the cache or from a worker. */
+void routes_serve(struct call *call);
+
+/* Everything the call's request refers to must be in the store. */
+bool routes_check_store(struct call *call, uint32_t *retry_after_s, struct pen_error *error);
 
 /* Answers. */
 void routes_fail(struct call *call, const struct pen_error *error, uint32_t retry_after_s);

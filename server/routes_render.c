@@ -2,6 +2,7 @@
 #include "protocol/json_request.h"
 #include "protocol/json_result.h"
 #include "server/accept.h"
+#include "server/auto_choice.h"
 #include "server/clock.h"
 #include "server/routes.h"
 #include <stdio.h>
@@ -31,6 +32,10 @@ static void add_picture_headers(struct call *call, const struct picture *picture
     http_add_header(x, "Server-Timing", "%s", timing);
     http_add_header(x, "Vary", "Accept");
     http_add_header(x, "Cache-Control", "no-cache"); /* keep it, but ask: a restart may change it */
+    if (*call->choice)
+        http_add_header(x, "X-Penumbra-Choice", "%s", call->choice);
+    if (*call->choice && !call->choice_met)
+        http_add_header(x, "X-Penumbra-Warning", "%s", call->choice);
     for (uint32_t i = 0; i < picture->result.warning_count && i < 3; i++)
         http_add_header(x, "X-Penumbra-Warning", "%s", picture->result.warnings[i]);
 }
@@ -54,7 +59,9 @@ static void answer_picture(struct call *call, struct picture *picture)
             .image_href = kept ? href : NULL,
             .etag = picture->tag,
             .total_ms = total_ms,
-            .from_cache = call->is_cached};
+            .from_cache = call->is_cached,
+            .choice = *call->choice ? call->choice : NULL,
+            .choice_met = call->choice_met};
         routes_json(call, 200, pen_result_json(&picture->result, &extra, s->catalogue));
         return;
     }
@@ -71,6 +78,8 @@ static void finish(struct waiter *waiter, const struct outcome *outcome)
 {
     struct call *call = (struct call *)((char *)waiter - offsetof(struct call, waiter));
     call->queue_ms = outcome->queue_ms;
+    if (*call->choice && outcome->error.code == PEN_OK)
+        auto_runs_observe(call->service->auto_runs, call, outcome->run_ms);
     if (outcome->error.code != PEN_OK)
         routes_fail(call, &outcome->error, outcome->retry_after_s);
     else
@@ -117,8 +126,7 @@ static bool negotiate(struct call *call, struct pen_error *error)
         "The image is %s, which Accept does not allow.", pen_format_mime[output->format]);
 }
 
-/* Everything the request refers to must be in the store. */
-static bool check_store(struct call *call, uint32_t *retry_after_s, struct pen_error *error)
+bool routes_check_store(struct call *call, uint32_t *retry_after_s, struct pen_error *error)
 {
     struct service *s = call->service;
     struct store_entry entry;
@@ -151,20 +159,30 @@ static bool wants_fresh(const struct call *call)
 
 void routes_render(struct call *call)
 {
-    struct service *s = call->service;
     struct pen_error error = {0};
     uint32_t retry_after_s = 0;
-    struct pen_device_info device;
     if (!read_request(call, &error) || !negotiate(call, &error)) {
         routes_fail(call, &error, 0);
         return;
     }
     memcpy(call->request.scene, call->id, PEN_ID_BYTES);
-    call->technique = pen_catalogue_find(s->catalogue, call->request.technique)->name;
-    if (!check_store(call, &retry_after_s, &error)) {
+    if (!routes_check_store(call, &retry_after_s, &error)) {
         routes_fail(call, &error, retry_after_s);
         return;
     }
+    if (!strcmp(call->request.technique, AUTO_NAME))
+        routes_auto(call);
+    else
+        routes_serve(call);
+}
+
+void routes_serve(struct call *call)
+{
+    struct service *s = call->service;
+    struct pen_error error = {0};
+    uint32_t retry_after_s = 0;
+    struct pen_device_info device;
+    call->technique = pen_catalogue_find(s->catalogue, call->request.technique)->name;
     bool fresh = wants_fresh(call);
     if (!fresh && service_device(s, &device)) {
         char tag[PEN_ID_HEX + 1];
@@ -191,7 +209,8 @@ void routes_render(struct call *call)
     call->waiter.is_gone = is_gone;
     call->waiter.finish = finish;
     call->holds_share = true; /* before another thread can complete the call */
-    http_defer(call->exchange);
+    if (!call->is_deferred)
+        http_defer(call->exchange);
     if (!scheduler_submit(
             s->scheduler, &call->request, key, !fresh, &call->waiter, &retry_after_s, &error)) {
         call->holds_share = false;

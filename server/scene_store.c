@@ -280,6 +280,12 @@ int scene_store_open_meta(struct scene_store *store, enum store_kind kind,
     return open_file(store, kind, id, STORE_META, error);
 }
 
+int scene_store_open_folder(struct scene_store *store, enum store_kind kind,
+    const uint8_t id[PEN_ID_BYTES], struct pen_error *error)
+{
+    return open_file(store, kind, id, ".", error);
+}
+
 static void new_name(struct scene_store *store, char name[32])
 {
     pthread_mutex_lock(&store->lock);

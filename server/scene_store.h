@@ -42,6 +42,9 @@ int scene_store_open_source(struct scene_store *store, enum store_kind kind,
     const uint8_t id[PEN_ID_BYTES], struct pen_error *error);
 int scene_store_open_meta(struct scene_store *store, enum store_kind kind,
     const uint8_t id[PEN_ID_BYTES], struct pen_error *error);
+/* The entry's folder, for what is derived from it: goes with the entry. -1: not there. */
+int scene_store_open_folder(struct scene_store *store, enum store_kind kind,
+    const uint8_t id[PEN_ID_BYTES], struct pen_error *error);
 bool scene_store_remove(struct scene_store *store, enum store_kind kind,
     const uint8_t id[PEN_ID_BYTES], struct pen_error *error);
 

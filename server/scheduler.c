@@ -1,9 +1,11 @@
 #include "server/scheduler.h"
 #include "server/clock.h"
+#include <fcntl.h>
 #include <math.h>
 #include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #define BATCH_TURN 8 /* every eighth render may be a batch one, so that batches never starve */
 
@@ -135,6 +137,13 @@ static void unlink_running(struct scheduler *s, struct render *render)
     s->numbers.running--;
 }
 
+static void free_render(struct render *render)
+{
+    if (render && render->reference_fd > 0)
+        close(render->reference_fd);
+    free(render);
+}
+
 static struct render *find_key(struct scheduler *s, const uint8_t key[PEN_ID_BYTES])
 {
     struct render *lists[] = {s->queue[0][0], s->queue[1][0], s->running};
@@ -195,6 +204,9 @@ bool scheduler_submit(struct scheduler *s, const struct pen_request *request,
             render->batch = batch;
             render->queued_ns = clock_now_ns();
             memcpy(render->key, key, PEN_ID_BYTES);
+            render->measure = waiter->measure;
+            if (waiter->reference_fd > 0)
+                render->reference_fd = fcntl(waiter->reference_fd, F_DUPFD_CLOEXEC, 3);
             push_back(s, render);
         }
         attach(s, render, waiter);
@@ -278,7 +290,7 @@ struct render *scheduler_take(struct scheduler *s)
         pthread_mutex_unlock(&s->lock);
         if (wanted)
             return render;
-        free(render);
+        free_render(render);
     }
 }
 
@@ -294,7 +306,7 @@ void scheduler_return(struct scheduler *s, struct render *render)
     if (wanted)
         s->on_work(s->context);
     else
-        free(render);
+        free_render(render);
 }
 
 void scheduler_finish(struct scheduler *s, struct render *render, const struct outcome *outcome)
@@ -312,10 +324,11 @@ void scheduler_finish(struct scheduler *s, struct render *render, const struct o
         s->mean_ms += 0.1 * (ms - s->mean_ms);
     answer.retry_after_s = retry_after(s);
     pthread_mutex_unlock(&s->lock);
+    answer.run_ms = ms;
     answer.queue_ms = clock_ms(render->taken_ns - render->queued_ns);
     answer.shared = count > 1;
     answer_all(waiters, &answer);
-    free(render);
+    free_render(render);
 }
 
 /* Moves the waiters that `now` has overtaken (UINT64_MAX: all of them) to *out. */
@@ -351,7 +364,7 @@ static void prune(struct scheduler *s)
             if (r->waiters)
                 continue;
             unlink_queued(s, r);
-            free(r);
+            free_render(r);
         }
     }
 }

@@ -8,9 +8,13 @@
 struct outcome {
     struct pen_error error;  /* PEN_OK: there is a picture */
     struct picture *picture; /* borrowed for the call */
-    double queue_ms;
-    uint32_t retry_after_s; /* with 429 and 503 */
-    bool shared;            /* another client's request rendered it */
+    double queue_ms, run_ms; /* before and after a worker took it */
+    uint32_t retry_after_s;  /* with 429 and 503 */
+    bool shared;             /* another client's request rendered it */
+    /* Of measurements, borrowed like the picture: */
+    const struct pen_result *result; /* also when nothing was encoded */
+    int planes_fd;                   /* of a reference; 0: none */
+    struct picture *maps[3];         /* enum channel_map; NULL: none */
 };
 
 /* One client waiting. The owner keeps it alive from a successful scheduler_submit until `finish`,
@@ -21,6 +25,8 @@ struct waiter {
     uint64_t client;                        /* whose share it uses; 0: nobody's */
     bool (*is_gone)(struct waiter *waiter); /* the client has hung up; may be NULL */
     void (*finish)(struct waiter *waiter, const struct outcome *outcome);
+    uint32_t measure; /* enum channel_measure; what is measured is never shared */
+    int reference_fd; /* planes to compare with, needed until scheduler_submit returns; 0: none */
 };
 
 struct render {
@@ -32,6 +38,8 @@ struct render {
     uint64_t queued_ns, taken_ns;
     uint64_t last_deadline_ns;
     bool shareable, running, batch;
+    uint32_t measure;
+    int reference_fd;         /* the render's own; 0: none */
     uint32_t attempts, kills; /* kept by the worker pool */
 };
 

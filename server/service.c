@@ -2,6 +2,7 @@
 #include "protocol/json_result.h"
 #include "protocol/openapi.h"
 #include "renderer/blob/builder.h"
+#include "server/auto_choice.h"
 #include "server/clock.h"
 #include "server/hash.h"
 #include "server/log.h"
@@ -284,7 +285,8 @@ struct service *service_create(
     if (!s)
         abort();
     s->config = config;
-    s->catalogue = catalogue;
+    s->catalogue = catalogue = auto_catalogue(catalogue);
+    s->auto_runs = auto_runs_create();
     s->started_ns = clock_now_ns();
     s->canary_blob = -1;
     pthread_mutex_init(&s->canary_lock, NULL);
@@ -385,6 +387,7 @@ void service_destroy(struct service *s, const bool *hurry)
         scene_store_close(s->store);
     if (s->canary_blob >= 0)
         close(s->canary_blob);
+    auto_runs_destroy(s->auto_runs);
     auth_destroy(s->auth);
     free(s->openapi);
     free(s->cert_pem);

@@ -2,6 +2,7 @@
 #pragma once
 #include "protocol/technique_info.h"
 #include "server/auth.h"
+#include "server/auto_render.h"
 #include "server/config.h"
 #include "server/http.h"
 #include "server/importer.h"
@@ -22,6 +23,7 @@ struct service {
     struct worker_pool *pool;
     struct result_cache *cache;
     struct metrics *metrics;
+    struct auto_runs *auto_runs;
     struct auth *auth; /* NULL: no token is asked for */
     struct http_listener *listener, *admin;
     char *openapi, openapi_tag[PEN_ID_HEX + 1];

@@ -4,7 +4,9 @@
 #include "server/channel.h"
 #include "server/clock.h"
 #include "server/worker_encoder.h"
+#include "server/worker_measure.h"
 #include <errno.h>
+#include <fcntl.h>
 #include <poll.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -96,8 +98,12 @@ static bool run_job(
     item->message.kind = CHANNEL_DONE;
     item->message.job = message->job;
     item->output = job->request.output;
+    item->measure = job->measure;
+    item->reference_fd = -1;
     result->completed = job->request;
-    bool ok = fds->count == 1 + job->image_count && job->image_count <= PEN_MAX_LIGHTS;
+    bool compares = channel_has_reference(job->measure);
+    bool ok = job->image_count <= PEN_MAX_LIGHTS && job->measure <= CHANNEL_NUMBERS &&
+              fds->count == 1 + job->image_count + compares;
     if (!ok)
         pen_fail(error, PEN_INTERNAL, "", "The worker was handed an incomplete job.");
     ok = ok && pen_request_check(&job->request, pen_renderer_catalogue(), error);
@@ -105,7 +111,15 @@ static bool run_job(
     uint64_t start = clock_now_ns();
     ok = ok && load(worker, job, fds, error);
     double load_ms = clock_ms(clock_now_ns() - start);
-    ok = ok && pen_renderer_render(worker->renderer, &job->request, &item->frame, result, error);
+    struct pen_request request = job->request;
+    if (ok && job->measure != CHANNEL_PICTURE) {
+        worker_measure_output(&request.output);
+        pen_renderer_drop_shadows(worker->renderer);
+    }
+    if (ok && compares)
+        item->reference_fd = fcntl(fds->fd[1 + job->image_count], F_DUPFD_CLOEXEC, 3);
+    ok = ok && pen_renderer_render(worker->renderer, &request, &item->frame, result, error);
+    result->completed.output = job->request.output;
     if (!ok && pen_renderer_is_lost(worker->renderer)) {
         free(item);
         return false;

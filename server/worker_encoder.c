@@ -1,6 +1,7 @@
 #include "server/worker_encoder.h"
 #include "renderer/encode/encode.h"
 #include "server/clock.h"
+#include "server/worker_measure.h"
 #include <errno.h>
 #include <fcntl.h>
 #include <pthread.h>
@@ -42,34 +43,52 @@ fail:
     return -1;
 }
 
+bool worker_encoder_hand_over(
+    const struct pen_bytes *bytes, struct channel_fds *fds, struct pen_error *error)
+{
+    int fd = seal(bytes);
+    if (fd < 0)
+        return pen_fail(error, PEN_INTERNAL, "", "The image could not be handed over.");
+    fds->fd[fds->count++] = fd;
+    return true;
+}
+
+static bool encode_picture(
+    const struct worker_item *item, struct pen_result *result, struct channel_fds *fds)
+{
+    char scene[PEN_ID_HEX + 1], attributes[4][PEN_ID_HEX + 96];
+    pen_id_to_hex(result->completed.scene, scene);
+    snprintf(attributes[0], sizeof attributes[0], "Software=penumbra %s", PENUMBRA_VERSION);
+    snprintf(attributes[1], sizeof attributes[1], "penumbra:scene=%s", scene);
+    snprintf(attributes[2], sizeof attributes[2], "penumbra:technique=%.31s",
+        result->completed.technique);
+    snprintf(
+        attributes[3], sizeof attributes[3], "penumbra:renderer=%.127s", result->device.renderer);
+    const char *list[] = {attributes[0], attributes[1], attributes[2], attributes[3]};
+    struct pen_bytes bytes = {0};
+    bool ok = pen_encode(&item->frame, &item->output, list, 4, &bytes, &result->error) &&
+              worker_encoder_hand_over(&bytes, fds, &result->error);
+    result->image_bytes = bytes.size;
+    pen_bytes_finish(&bytes);
+    return ok;
+}
+
 static void encode(struct worker_encoder *encoder, struct worker_item *item)
 {
     struct pen_result *result = &item->message.result;
     struct channel_fds fds = {0};
     if (result->error.code == PEN_OK) {
-        char scene[PEN_ID_HEX + 1], attributes[4][PEN_ID_HEX + 96];
-        pen_id_to_hex(result->completed.scene, scene);
-        snprintf(attributes[0], sizeof attributes[0], "Software=penumbra %s", PENUMBRA_VERSION);
-        snprintf(attributes[1], sizeof attributes[1], "penumbra:scene=%s", scene);
-        snprintf(attributes[2], sizeof attributes[2], "penumbra:technique=%.31s",
-            result->completed.technique);
-        snprintf(attributes[3], sizeof attributes[3], "penumbra:renderer=%.127s",
-            result->device.renderer);
-        const char *list[] = {attributes[0], attributes[1], attributes[2], attributes[3]};
-        struct pen_bytes bytes = {0};
         uint64_t start = clock_now_ns();
-        if (pen_encode(&item->frame, &item->output, list, 4, &bytes, &result->error)) {
-            result->stage_ms[PEN_STAGE_ENCODE] = (float)clock_ms(clock_now_ns() - start);
-            result->image_bytes = bytes.size;
-            fds.fd[0] = seal(&bytes);
-            fds.count = fds.fd[0] >= 0;
-            if (!fds.count)
-                pen_fail(&result->error, PEN_INTERNAL, "", "The image could not be handed over.");
-        } else if (result->error.code == PEN_OK) {
+        bool ok = item->measure == CHANNEL_PICTURE ? encode_picture(item, result, &fds)
+                                                   : worker_measure(item, &fds);
+        if (!ok && result->error.code == PEN_OK)
             pen_fail(&result->error, PEN_INTERNAL, "", "The image could not be encoded.");
-        }
-        pen_bytes_finish(&bytes);
+        result->stage_ms[PEN_STAGE_ENCODE] = (float)clock_ms(clock_now_ns() - start);
+        if (!ok)
+            channel_close_fds(&fds);
     }
+    if (item->reference_fd >= 0)
+        close(item->reference_fd);
     pen_frame_finish(&item->frame);
     channel_send(encoder->socket, &item->message, &fds); /* a daemon that left needs no answer */
     channel_close_fds(&fds);

@@ -1,9 +1,11 @@
 #include "server/worker_pool.h"
 #include "server/clock.h"
 #include "server/log.h"
+#include "server/measured.h"
 #include "server/process.h"
 #include "server/quarantine.h"
 #include <errno.h>
+#include <fcntl.h>
 #include <poll.h>
 #include <pthread.h>
 #include <signal.h>
@@ -242,7 +244,10 @@ static void on_done(
     pthread_mutex_lock(&pool->lock);
     pool->numbers.gpu_bytes = result.gpu_bytes;
     pthread_mutex_unlock(&pool->lock);
-    if (outcome.error.code == PEN_OK) {
+    outcome.result = &result;
+    if (outcome.error.code == PEN_OK && flight->render->measure != CHANNEL_PICTURE) {
+        measured_take(flight->render->measure, fds, &outcome);
+    } else if (outcome.error.code == PEN_OK) {
         char tag[PEN_ID_HEX + 1];
         picture_tag(&flight->render->request, &result.device, tag);
         outcome.picture =
@@ -253,7 +258,7 @@ static void on_done(
             pool->config.on_picture(pool->config.context, outcome.picture);
     }
     finish(slot, flight, &outcome);
-    picture_release(outcome.picture);
+    measured_release(&outcome);
 }
 
 /* False when the worker is to be buried. */
@@ -329,11 +334,15 @@ static bool dispatch(struct slot *slot, struct flight *flight, struct render *re
     flight->phase = PHASE_SENT;
     flight->since_ns = clock_now_ns();
     message.job_data.request = render->request;
+    message.job_data.measure = render->measure;
     if (!pool->config.open_job(pool->config.context, &message.job_data, &fds, &outcome.error)) {
         channel_close_fds(&fds);
         finish(slot, flight, &outcome);
         return true;
     }
+    int reference = render->reference_fd > 0 ? fcntl(render->reference_fd, F_DUPFD_CLOEXEC, 3) : -1;
+    if (reference >= 0)
+        fds.fd[fds.count++] = reference;
     bool ok = channel_send(slot->socket, &message, &fds);
     channel_close_fds(&fds);
     return ok;

@@ -44,6 +44,7 @@ void cli_server_init(struct cli_server *server);
 bool cli_common_option(struct cli_args *args, struct cli_server *server);
 
 int cli_render(struct cli_args *args);
+int cli_compare(struct cli_args *args);
 int cli_scenes(struct cli_args *args);
 int cli_techniques(struct cli_args *args);
 int cli_generate(struct cli_args *args);

@@ -1,3 +1,4 @@
+#include "clients/cli/render.h"
 #include "clients/cli/request_args.h"
 #include "clients/cli/upload.h"
 #include "protocol/request.h"
@@ -106,8 +107,7 @@ static const char *accepted(const cJSON *root)
     return format < 0 ? "image/*" : pen_format_mime[format];
 }
 
-/* Uploads the files that lights have as textures and puts their ids in their place. */
-static int upload_textures(const struct cli_server *server, cJSON *root)
+int cli_upload_textures(const struct cli_server *server, cJSON *root)
 {
     const cJSON *lights = cJSON_GetObjectItemCaseSensitive(root, "lights");
     for (cJSON *light = lights ? lights->child : NULL; light; light = light->next) {
@@ -125,8 +125,7 @@ static int upload_textures(const struct cli_server *server, cJSON *root)
     return CLI_OK;
 }
 
-/* Calls and leaves the image in `path`, which appears only when it is complete. */
-static int save(const struct cli_server *server, struct cli_call *call, const char *path)
+int cli_save_image(const struct cli_server *server, struct cli_call *call, const char *path)
 {
     struct cli_answer answer = {0};
     bool to_stdout = !strcmp(path, "-");
@@ -184,7 +183,7 @@ static int render(const struct options *options, cJSON *root)
     char id[PEN_ID_HEX + 1], *image = NULL;
     int status = cli_upload_scene(server, options->scene, id, NULL);
     if (status == CLI_OK)
-        status = upload_textures(server, root);
+        status = cli_upload_textures(server, root);
     if (status != CLI_OK)
         return status;
     char *body = cJSON_PrintUnformatted(root), *path = cli_format("/v1/scenes/%s/render", id);
@@ -202,7 +201,7 @@ static int render(const struct options *options, cJSON *root)
             call.path = image;
             call.content_type = call.body = NULL;
         }
-        status = save(server, &call, options->output);
+        status = cli_save_image(server, &call, options->output);
     }
     free(image);
     free(path);

@@ -158,6 +158,10 @@ bool cascade_range(const struct view *view, const struct light *light,
     }
     if (!(range[1] > 0))
         return false;
+    /* Where all receivers are about equally far they belong to the first cascade, whose bounds this
+     * moves beyond them. */
+    if (range[1] < 1.25f * range[0])
+        range[1] = 2.5f * range[1];
     range[0] = exp2f(floorf(log2f(range[0]) * 16) / 16);
     range[1] = exp2f(ceilf(log2f(range[1]) * 16) / 16);
     return true;

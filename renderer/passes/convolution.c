@@ -1,9 +1,10 @@
 #include "renderer/passes/convolution.h"
+#include "renderer/passes/sat.h"
 #include <math.h>
 #include <string.h>
 
-const char *const convolution_format_names[] = {"rgba8", "rgba16", NULL};
-static const GLenum formats[] = {GL_RGBA8, GL_RGBA16};
+const char *const convolution_format_names[] = {"rgba8", "rgba16", "tables", NULL};
+static const GLenum formats[] = {GL_RGBA8, GL_RGBA16, GL_RGBA32UI};
 
 static double series(const struct convolution_block *block, double x)
 {
@@ -33,29 +34,62 @@ struct convolution_block convolution_constants(const struct convolution_desc *de
     return block;
 }
 
+/* A window's sum must fit 32 bits; the widest one is the blocker search at the far plane, or the
+ * fixed filter of a method. Fractional corners touch a texel more on either side. */
+void convolution_fit(struct convolution_block *block, const struct convolution_desc *desc,
+    const struct light_face *face)
+{
+    const double least = 2 * 256 + 2;
+    double texels = 1;
+    for (int k = 0; k < 2; k++) {
+        double reach = face->far_z - face->near_z;
+        double half =
+            (double)face->half[k] * (face->parallel ? reach : reach / (double)face->far_z);
+        double texel = (double)(face->rect[2 + k] - face->rect[k]) / desc->size;
+        texels *= fmin(fmax(2 * half / texel + 4, least), desc->size);
+    }
+    block->table_scale = (float)(1 / fmin(floor(4294967295.0 / texels), 1 << 22));
+}
+
 struct basis_block {
     float range;
-    int32_t first_term, terms, pad;
+    int32_t first_term, terms;
+    float table_scale;
 };
 
 static bool fill(struct technique_run *run, const struct gl_texture *map, struct gl_texture *array,
-    const struct convolution_desc *desc, uint32_t series_layers, const char *define,
+    const struct convolution_desc *desc, uint32_t series_layers, bool weighted,
     struct pen_error *error)
 {
+    static const char *const defines[2][2] = {
+        {NULL, "#define WEIGHTED\n"}, {"#define TABLES\n", "#define TABLES\n#define WEIGHTED\n"}};
+    bool tables = desc->format == CONVOLUTION_TABLES;
     struct pass_texture from = {UNIT_FREE, map->name, GL_SAMPLE_NEAREST};
-    struct basis_block block = {
-        .range = convolution_constants(desc).range, .terms = (int32_t)desc->terms};
+    struct convolution_block constants = convolution_constants(desc);
+    convolution_fit(&constants, desc, run->face);
+    struct basis_block block = {.range = constants.range,
+        .terms = (int32_t)desc->terms,
+        .table_scale = constants.table_scale};
+    /* Tables are summed one layer at a time, outside the array. */
+    struct gl_texture single = {0}, sums = {0};
+    if (tables) {
+        single = gl_texture_create(GL_RGBA32UI, desc->size, desc->size, 0, 1);
+        sums = gl_texture_create(GL_RGBA32UI, desc->size + 1, desc->size + 1, 0, 1);
+    }
     GLuint framebuffer;
     bool ok = true;
     gl.CreateFramebuffers(1, &framebuffer);
     for (uint32_t i = 0; ok && i < array->layers; i++) {
-        gl.NamedFramebufferTextureLayer(
-            framebuffer, GL_COLOR_ATTACHMENT0, array->name, 0, (GLint)i);
+        if (tables)
+            gl.NamedFramebufferTexture(framebuffer, GL_COLOR_ATTACHMENT0, single.name, 0);
+        else
+            gl.NamedFramebufferTextureLayer(
+                framebuffer, GL_COLOR_ATTACHMENT0, array->name, 0, (GLint)i);
         block.first_term = i < series_layers ? (int32_t)(2 * i) : -1;
         ok = pass_fill(run->ctx,
             &(struct pass_fill){.name = "convolution basis",
                 .fragment = "convolution.frag",
-                .defines = define,
+                .defines = defines[tables][weighted],
                 .stage = PEN_STAGE_SHADOW,
                 .textures = &from,
                 .texture_count = 1,
@@ -65,8 +99,17 @@ static bool fill(struct technique_run *run, const struct gl_texture *map, struct
                 .extra = &block,
                 .extra_bytes = sizeof block},
             error);
+        if (!ok || !tables)
+            continue;
+        ok = sat_scan(run->ctx, &single, &sums, SAT_AUTO, error);
+        gl.CopyImageSubData(sums.name, GL_TEXTURE_2D, 0, 0, 0, 0, array->name, GL_TEXTURE_2D_ARRAY,
+            0, 0, 0, (GLint)i, (GLsizei)sums.width, (GLsizei)sums.height, 1);
     }
     gl.DeleteFramebuffers(1, &framebuffer);
+    gl_texture_destroy(&single);
+    gl_texture_destroy(&sums);
+    if (tables)
+        return ok;
     gl_timer_begin(&run->ctx->timer, PEN_STAGE_SHADOW, "convolution mips");
     gl.GenerateTextureMipmap(array->name);
     gl_timer_end(&run->ctx->timer);
@@ -86,14 +129,15 @@ static bool build(struct technique_run *run, const struct shadow_key *key,
         return false;
     uint32_t layers = (desc.terms + 1) / 2;
     GLenum format = formats[desc.format];
-    input->textures[0] = gl_texture_create(format, desc.size, desc.size, layers, 0);
-    if (!fill(run, &map->textures[0], &input->textures[0], &desc, layers, NULL, error))
+    bool tables = desc.format == CONVOLUTION_TABLES;
+    uint32_t side = desc.size + tables, levels = tables ? 1 : 0;
+    input->textures[0] = gl_texture_create(format, side, side, layers, levels);
+    if (!fill(run, &map->textures[0], &input->textures[0], &desc, layers, false, error))
         return false;
     if (!desc.weighted)
         return true;
-    input->textures[1] = gl_texture_create(format, desc.size, desc.size, layers + 1, 0);
-    return fill(
-        run, &map->textures[0], &input->textures[1], &desc, layers, "#define WEIGHTED\n", error);
+    input->textures[1] = gl_texture_create(format, side, side, layers + 1, levels);
+    return fill(run, &map->textures[0], &input->textures[1], &desc, layers, true, error);
 }
 
 const struct shadow_input *pass_convolution(

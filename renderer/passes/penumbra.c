@@ -1,7 +1,29 @@
 #include "renderer/passes/penumbra.h"
+#include "renderer/passes/classify.h"
 #include <stdio.h>
 
-bool pass_penumbra_spread(struct technique_run *run, uint32_t map_size, struct pen_error *error)
+bool pass_penumbra_tiles(struct technique_run *run, const struct shadow_input *casters,
+    float margin_texels, const struct gl_texture *scratch, const struct gl_texture **tiles,
+    struct pen_error *error)
+{
+    struct gl_program_desc desc = {.vertex = "tiles.vert",
+        .fragment = "constant.frag",
+        .defines = "#define CONSTANT vec4(0.0, 0.0, 0.0, 0.001)\n"};
+    *tiles = NULL;
+    if (!run->request->classify.on)
+        return true;
+    GLuint program = gl_programs_get(run->ctx->programs, &desc, error);
+    if (!program || !(*tiles = pass_classify(run, casters, margin_texels, error)))
+        return false;
+    GLuint framebuffer = gl_framebuffer_create(&scratch, 1, NULL);
+    pass_draw_tiles(
+        run->ctx, program, framebuffer, *tiles, TILE_UMBRA, run->width, run->height, false);
+    gl.DeleteFramebuffers(1, &framebuffer);
+    return true;
+}
+
+bool pass_penumbra_spread(
+    struct technique_run *run, uint32_t map_size, float min_filter, struct pen_error *error)
 {
     static const float lit[4] = {1}; /* nothing to filter */
     const struct shadow_input *map = pass_caster_map(run, map_size, error);
@@ -11,6 +33,9 @@ bool pass_penumbra_spread(struct technique_run *run, uint32_t map_size, struct p
     const struct gl_texture *spread = pass_scratch(run, SCRATCH_SPREAD, GL_RGBA16F, 1);
     if (pass_is_first_face(run))
         pass_scratch_clear(spread, lit);
+    const struct gl_texture *tiles;
+    if (!pass_penumbra_tiles(run, min_max, min_filter + 1, spread, &tiles, error))
+        return false;
     GLuint framebuffer = gl_framebuffer_create(&spread, 1, NULL);
     struct pass_texture pyramid = {UNIT_MIN_MAX, min_max->textures[0].name, GL_SAMPLE_NEAREST};
     bool ok = pass_screen(run,
@@ -19,6 +44,7 @@ bool pass_penumbra_spread(struct technique_run *run, uint32_t map_size, struct p
             .shadow = &map->textures[0],
             .textures = &pyramid,
             .texture_count = 1,
+            .tiles = tiles,
             .framebuffer = framebuffer},
         error);
     gl.DeleteFramebuffers(1, &framebuffer);
@@ -60,9 +86,10 @@ static GLuint make_target(struct technique_run *run, bool next)
 static bool filter(struct technique_run *run, const struct step *step, struct pen_error *error)
 {
     struct technique_ctx *ctx = run->ctx;
-    char defines[160];
+    char defines[256];
     bool hard = step->source == PENUMBRA_HARD;
-    snprintf(defines, sizeof defines, "%s%s%s%s", step->defines, step->last ? "#define LAST\n" : "",
+    snprintf(defines, sizeof defines, "#define LIGHT_SHAPE %d\n#define LIGHT_PARALLEL %d\n%s%s%s%s",
+        run->face->shape, run->face->parallel, step->defines, step->last ? "#define LAST\n" : "",
         hard ? "#define FROM_HARD\n" : "", is_textured(run) ? "#define TEXTURED\n" : "");
     GLuint framebuffer = 0;
     if (!step->last) {

@@ -23,7 +23,15 @@
 /* Writes SCRATCH_SPREAD, RGBA16F, for this face's receivers: hard visibility, then the Gaussian of
  * screen_spread in penumbra.glsl, px. (1, 0, 0, 0): proved to be lit, or no receiver at all; all
  * zeros: a receiver that all of the light is behind. */
-bool pass_penumbra_spread(struct technique_run *run, uint32_t map_size, struct pen_error *error);
+bool pass_penumbra_spread(
+    struct technique_run *run, uint32_t map_size, float min_filter, struct pen_error *error);
+
+/* Classifies the face's tiles when the request wants that (NULL in *tiles: it does not). Umbra
+ * tiles of the scratch texture become (0, 0, 0, 0.001): dark, and nothing to filter.
+ * `margin_texels` as in pass_classify. */
+bool pass_penumbra_tiles(struct technique_run *run, const struct shadow_input *casters,
+    float margin_texels, const struct gl_texture *scratch, const struct gl_texture **tiles,
+    struct pen_error *error);
 
 enum penumbra_source { PENUMBRA_HARD, PENUMBRA_SAMPLES };
 

@@ -33,7 +33,7 @@ void main()
             vec2 d = vec2(float(offset.x) - spread.z * float(offset.y), float(offset.y)) / deviation;
             vec2 spline = vec2(x == 0 ? 0.375 : abs(x) == 1 ? 0.25 : 0.0625,
                 y == 0 ? 0.375 : abs(y) == 1 ? 0.25 : 0.0625);
-            float w = inside * spline.x * spline.y * 
+            float w = inside * spline.x * spline.y *
                 exp(-0.5 * dot(d, d) - surface_difference(plane, at, offset));
             sum += w * ratio_at(at);
             total += w;

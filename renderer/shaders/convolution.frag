@@ -5,16 +5,22 @@ layout(std140, binding = 3) uniform BasisBlock {
     float range;
     int first_term; // from 0; -1: depth itself
     int terms;
-    int pad;
+    float table_scale;
 } basis;
+#ifdef TABLES
+layout(location = 0) out uvec4 value;
+#define STORED(v) uvec4(clamp(v, 0.0, 1.0) / basis.table_scale + 0.5)
+#else
 layout(location = 0) out vec4 value;
+#define STORED(v) (v)
+#endif
 
 void main()
 {
     float d = texelFetch(source, ivec2(gl_FragCoord.xy), 0).r;
     float z = (light_linear(d) - light.near_z) / (light.far_z - light.near_z) * basis.range;
     if (basis.first_term < 0) {
-        value = vec4(z, 0.0, 0.0, 0.0);
+        value = STORED(vec4(z, 0.0, 0.0, 0.0));
         return;
     }
     float c = 3.14159265 * float(2 * basis.first_term + 1) * z, step = 6.28318531 * z;
@@ -24,5 +30,5 @@ void main()
 #ifdef WEIGHTED
     v *= z;
 #endif
-    value = 0.5 * v + 0.5;
+    value = STORED(0.5 * v + 0.5);
 }

@@ -99,14 +99,15 @@ ReceiverPlane receiver_plane(vec3 p, vec3 n)
     ReceiverPlane plane;
     float range = light.far_z - light.near_z;
     plane.depth = light_depth(p.z);
+    // At grazing incidence the plane runs through the light: bounded to about 1 degree. A receiver
+    // that turns its back to the light's centre is not in the map at all: its plane says nothing of
+    // what is, so its own depth is compared.
     if (light_parallel) {
-        float nz = n.z < 0.0 ? min(n.z, -0.02) : max(n.z, 0.02);
-        plane.gradient = -n.xy / (nz * range);
+        plane.gradient = n.z < 0.0 ? -n.xy / (min(n.z, -0.02) * range) : vec2(0.0);
     } else {
-        // At grazing incidence the plane runs through the light: bounded to about 1 degree.
-        float np = dot(n, p), least = 0.02 * length(p);
-        np = np < 0.0 ? min(np, -least) : max(np, least);
-        plane.gradient = -light.far_z / range * n.xy / np;
+        float np = dot(n, p);
+        plane.gradient = np < 0.0
+            ? -light.far_z / range * n.xy / min(np, -0.02 * length(p)) : vec2(0.0);
     }
     return plane;
 }

@@ -99,17 +99,17 @@ float sample_lit_box(sampler2DArray maps, vec2 size, SampleMap map, SampledRecei
     vec2 low = (v.l * map.window.xy + map.window.zw) * size - 0.5 * float(KERNEL - 1);
     vec2 base = floor(low), f = low - base, metres = 1.0 / (size * map.window.xy);
     vec2 first = (base + 0.5 - low - 0.5 * float(KERNEL - 1)) * metres;
-    float sum = 0.0;
+    float dark = 0.0; // summed instead of light, so that no rounding darkens what is lit
     for (int y = 0; y < KERNEL; y++) {
         float wy = y == 0 ? 1.0 - f.y : y == KERNEL - 1 ? f.y : 1.0;
         for (int x = 0; x < KERNEL; x++) {
             float wx = x == 0 ? 1.0 - f.x : x == KERNEL - 1 ? f.x : 1.0;
             vec2 at = vec2(x, y);
             float d = texture(maps, vec3((base + at + 0.5) / size, map.layer.x)).r;
-            sum += sample_plane(r, v, first + at * metres) <= d ? wx * wy : 0.0;
+            dark += sample_plane(r, v, first + at * metres) <= d ? 0.0 : wx * wy;
         }
     }
-    return sum / float((KERNEL - 1) * (KERNEL - 1));
+    return max(1.0 - dark / float((KERNEL - 1) * (KERNEL - 1)), 0.0);
 #endif
 }
 #endif

@@ -65,7 +65,7 @@ static const struct pen_param rows[] = {
 };
 
 struct state {
-    GLuint counts; /* uint[3]: receivers by depth of subdivision */
+    GLuint counts; /* uint[2]: pixels split once, twice */
 };
 
 static bool create(struct technique_ctx *ctx, void *state, struct pen_error *error)

@@ -8,7 +8,7 @@
 #include "interleave_colour.glsl"
 
 layout(std430, binding = 1) buffer Counts {
-    uint subdivided[3];
+    uint subdivided[2]; // pixels split once, twice
 };
 
 #if P_estimator == 0
@@ -165,7 +165,8 @@ vec4 visibility(Surface s)
             result = mix(result, 0.25 * sum, weight);
         }
     }
-    atomicAdd(subdivided[depth], 1u);
+    if (depth > 0u)
+        atomicAdd(subdivided[depth - 1u], 1u);
 #ifdef INTERLEAVED
     // F5, for the averaging pass.
     float scale = light.parallel != 0 ? 1.0 : s.p.z / light.near_z;

@@ -2,11 +2,17 @@
 #include "receiver.glsl"
 #include "window.glsl"
 
-layout(binding = 7) uniform sampler2DArray basis;
-layout(binding = 8) uniform sampler2DArray basis_weighted;
+#ifdef TABLES
+#define SERIES_SAMPLER usampler2DArray
+#else
+#define SERIES_SAMPLER sampler2DArray
+#endif
+layout(binding = 7) uniform SERIES_SAMPLER basis;
+layout(binding = 8) uniform SERIES_SAMPLER basis_weighted;
 layout(std140, binding = 3) uniform ConvolutionBlock {
     vec4 weight[4];
     float range, offset, low, scale;
+    float table_scale;
 } series;
 
 #define LAYERS ((P(terms) + 1) / 2)
@@ -16,23 +22,84 @@ vec2 turned(vec2 a, vec2 b) // product of complex numbers
     return vec2(a.x * b.x - a.y * b.y, a.x * b.y + a.y * b.x);
 }
 
+#ifdef TABLES
+// A box of whole and cut texels [low, high]: sums to fractional corners are bilinear in those to
+// whole ones, and are taken relative to one corner while they are integers (see sat.glsl).
+struct Kernel {
+    ivec4 xs, ys;
+    vec4 wx, wy;
+};
+
+Kernel kernel_of(vec2 low, vec2 high, vec2 map_size)
+{
+    vec2 center = clamp(0.5 * (low + high), vec2(0.5), map_size - 0.5);
+    vec2 reach = max(0.5 * (high - low), vec2(0.5));
+    low = clamp(center - reach, vec2(0.0), map_size - 1.0);
+    high = clamp(center + reach, low + 1.0, map_size);
+    ivec2 last = ivec2(map_size), a = ivec2(low), b = ivec2(high);
+    vec2 fa = low - vec2(a), fb = high - vec2(b), size = high - low;
+    Kernel k;
+    k.xs = ivec4(a.x, min(a.x + 1, last.x), b.x, min(b.x + 1, last.x));
+    k.ys = ivec4(a.y, min(a.y + 1, last.y), b.y, min(b.y + 1, last.y));
+    k.wx = vec4(fa.x - 1.0, -fa.x, 1.0 - fb.x, fb.x) / size.x;
+    k.wy = vec4(fa.y - 1.0, -fa.y, 1.0 - fb.y, fb.y) * series.table_scale / size.y;
+    return k;
+}
+
+vec4 kernel_mean(usampler2DArray table, int layer, Kernel k)
+{
+    uvec4 base[4];
+    for (int i = 0; i < 4; i++)
+        base[i] = texelFetch(table, ivec3(k.xs[i], k.ys.x, layer), 0);
+    vec4 sum = vec4(0.0);
+    for (int j = 1; j < 4; j++) {
+        uvec4 first = texelFetch(table, ivec3(k.xs.x, k.ys[j], layer), 0) - base[0];
+        vec4 row = vec4(0.0);
+        for (int i = 1; i < 4; i++)
+            row += k.wx[i] *
+                vec4(texelFetch(table, ivec3(k.xs[i], k.ys[j], layer), 0) - base[i] - first);
+        sum += k.wy[j] * row;
+    }
+    return sum;
+}
+#else
+// One trilinear lookup. Its kernel has the variance of a box that is sqrt(3) of its texels wide,
+// which picks the level.
+struct Kernel {
+    vec2 uv;
+    float level;
+};
+
+Kernel kernel_of(vec2 low, vec2 high, vec2 map_size)
+{
+    vec2 size = high - low;
+    return Kernel(
+        0.5 * (low + high) / map_size, log2(max(0.57735 * max(size.x, size.y), 1.0)));
+}
+
+vec4 kernel_mean(sampler2DArray map, int layer, Kernel k)
+{
+    return textureLod(map, vec3(k.uv, float(layer)), k.level);
+}
+#endif
+
 // Means over the kernel of one lookup: x of 1 - f, the blocked share; when `weighted`, a constant,
 // y of (1 - f) z. `depth` is the receiver's, scaled and offset.
-vec2 series_lookup(float depth, vec2 uv, float level, bool weighted)
+vec2 series_lookup(float depth, Kernel kernel, bool weighted)
 {
     float angle = 3.14159265 * depth;
     vec2 phase = vec2(cos(angle), sin(angle)), turn = turned(phase, phase);
     vec2 sum = vec2(0.5, 0.0);
     if (weighted)
-        sum.y = 0.5 * textureLod(basis_weighted, vec3(uv, float(LAYERS)), level).r;
+        sum.y = 0.5 * kernel_mean(basis_weighted, int(LAYERS), kernel).r;
     for (int i = 0; i < int(LAYERS); i++) {
         vec2 next = turned(phase, turn);
         vec4 weight = series.weight[i >> 1];
         vec2 w = (i & 1) == 0 ? weight.xy : weight.zw;
         vec4 phases = vec4(phase.x, -phase.y, next.x, -next.y) * w.xxyy;
-        sum.x -= dot(phases, 2.0 * textureLod(basis, vec3(uv, float(i)), level) - 1.0);
+        sum.x -= dot(phases, 2.0 * kernel_mean(basis, i, kernel) - 1.0);
         if (weighted)
-            sum.y -= dot(phases, 2.0 * textureLod(basis_weighted, vec3(uv, float(i)), level) - 1.0);
+            sum.y -= dot(phases, 2.0 * kernel_mean(basis_weighted, i, kernel) - 1.0);
         phase = turned(next, turn);
     }
     return sum;
@@ -55,7 +122,11 @@ float series_step(float x)
 
 Receiver series_receiver(Surface s)
 {
+    #ifdef TABLES
+    return receiver_of(s, vec2(textureSize(basis, 0).xy - 1));
+#else
     return receiver_of(s, vec2(textureSize(basis, 0).xy));
+#endif
 }
 
 // What is proven of the window q +- extent. Blocked only where the series says so too, past its step,
@@ -76,17 +147,21 @@ float cell_depth(Receiver r, vec2 offset, vec2 extent)
 }
 
 // One lookup over the cell q + offset +- extent, and the share of the cell that the map covers;
-// outside the map nothing blocks. A trilinear lookup's kernel has the variance of a box that is
-// sqrt(3) of its texels wide, which picks the level.
+// outside the map nothing blocks.
 vec3 cell_lookup(Receiver r, vec2 offset, vec2 extent, bool weighted, out float depth)
 {
     vec2 at = (r.q + offset - light.rect.xy) / r.metres, reach = extent / r.metres;
     vec2 low = clamp(at - reach, vec2(0.0), r.map_size), high = clamp(at + reach, vec2(0.0), r.map_size);
     vec2 cover = reach.x > 0.0 && reach.y > 0.0 ? (high - low) / (2.0 * reach) : vec2(1.0);
-    float level = log2(max(1.1547 * max(reach.x, reach.y), 1.0));
     depth = cell_depth(r, offset, extent);
-    vec2 uv = 0.5 * (low + high) / r.map_size;
-    return vec3(series_lookup(depth - series.offset, uv, level, weighted), cover.x * cover.y);
+#ifndef TABLES
+    // A kernel with mips keeps its width at the border of the map.
+    vec2 center = 0.5 * (low + high);
+    low = center - reach;
+    high = center + reach;
+#endif
+    Kernel kernel = kernel_of(low, high, r.map_size);
+    return vec3(series_lookup(depth - series.offset, kernel, weighted), cover.x * cover.y);
 }
 
 // How a window of the light's shape is cut into about taps^2 cells that are nearly square.

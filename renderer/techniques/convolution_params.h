@@ -2,6 +2,7 @@
 #pragma once
 #include "renderer/passes/convolution.h"
 #include "renderer/techniques/map_params.h"
+#include <stdio.h>
 
 #define CONVOLUTION_ROWS(aggregate, default_terms, default_storage)                                \
     PARAM(aggregate, terms, .def = default_terms, .min = 1, .max = CONVOLUTION_MAX_TERMS,          \
@@ -17,7 +18,8 @@
             .help =                                                                                \
                 "Measures each lookup against its nearest caster, which keeps contacts dark."),    \
         PARAM(aggregate, storage, .def = default_storage, .choices = convolution_format_names,     \
-            .help = "Texels of the maps, two terms each.")
+            .help =                                                                                \
+                "Maps with mips of 8 or 16 bits, or summed-area tables: exact boxes, more reads.")
 #define RAW_ROW(aggregate)                                                                         \
     PARAM(aggregate, raw, .def = 0,                                                                \
         .help = "Shows the bare series: not rescaled to reach 0 and 1, nothing proven lit.")
@@ -37,13 +39,20 @@ static inline bool convolution_screen(struct technique_run *run,
         series ? pass_caster_min_max(run, desc->size, error) : NULL;
     if (!min_max)
         return false;
+    bool tables = desc->format == CONVOLUTION_TABLES;
+    enum gl_sampler_kind sampler = tables ? GL_SAMPLE_NEAREST : GL_SAMPLE_TRILINEAR;
     struct convolution_block block = convolution_constants(desc);
-    struct pass_texture textures[] = {{UNIT_FREE, series->textures[0].name, GL_SAMPLE_TRILINEAR},
-        {UNIT_FREE + 1, series->textures[desc->weighted].name, GL_SAMPLE_TRILINEAR},
+    convolution_fit(&block, desc, run->face);
+    struct pass_texture textures[] = {{UNIT_FREE, series->textures[0].name, sampler},
+        {UNIT_FREE + 1, series->textures[desc->weighted].name, sampler},
         {UNIT_MIN_MAX, min_max->textures[0].name, GL_SAMPLE_NEAREST}};
     pass.textures = textures;
     pass.texture_count = 3;
     pass.extra = &block;
     pass.extra_bytes = sizeof block;
+    char defines[64];
+    snprintf(defines, sizeof defines, "%s%s", tables ? "#define TABLES\n" : "",
+        pass.defines ? pass.defines : "");
+    pass.defines = defines;
     return pass_screen(run, &pass, error);
 }

@@ -1,5 +1,5 @@
 #include "renderer/passes/interleave.h"
-#include "renderer/passes/scratch.h"
+#include "renderer/passes/penumbra.h"
 #include "renderer/techniques/map_params.h"
 #include <stdio.h>
 
@@ -19,7 +19,7 @@ struct erosion {
 };
 
 static const struct pen_param rows[] = {
-    PARAM(struct erosion, variant, .choices = variant_names,
+    PARAM(struct erosion, variant, .choices = variant_names, .specialise = 1,
         .help = "Percentage-closer filtering of the penumbrae found (pcf), or a shadow factor "
                 "from the distance to the nearest edge (direct)."),
     MAP_SIZE_ROW(struct erosion, 2048),
@@ -30,7 +30,7 @@ static const struct pen_param rows[] = {
         .help = "Depth comparisons of the filter; variant pcf."),
     PARAM(struct erosion, min_filter, .def = 1, .min = 0, .max = 16, .unit = "texel",
         .help = "Least half width of the filter; variant pcf."),
-    PARAM(struct erosion, smooth, .def = 1, .specialise = 1,
+    PARAM(struct erosion, smooth, .def = 1,
         .help = "Shifts the taps per pixel and averages 4 x 4 pixels of wide penumbrae; variant "
                 "pcf."),
     PARAM(struct erosion, fit_radius, .def = 4, .min = 1, .max = 8, .unit = "px",
@@ -40,27 +40,51 @@ static const struct pen_param rows[] = {
                 "a fraction of the distance to the camera; variant direct."),
 };
 
+/* What the two variants share of light space. */
+struct inputs {
+    const struct shadow_input *map, *min_max;
+    const struct gl_texture *tiles; /* or NULL */
+};
+
 /* Runs `body` over this face's receivers into a scratch texture. */
 static bool write_scratch(struct technique_run *run, enum pass_scratch_slot slot, const char *body,
-    const struct shadow_input *map, bool border, struct pen_error *error)
+    const struct inputs *inputs, bool border, struct pen_error *error)
 {
-    const struct shadow_input *min_max = pass_caster_min_max(run, map->textures[0].width, error);
-    if (!min_max)
-        return false;
     const struct gl_texture *target = &run->ctx->scratch[slot];
     GLuint framebuffer = gl_framebuffer_create(&target, 1, NULL);
-    struct pass_texture pyramid = {UNIT_MIN_MAX, min_max->textures[0].name, GL_SAMPLE_NEAREST};
+    struct pass_texture pyramid = {
+        UNIT_MIN_MAX, inputs->min_max->textures[0].name, GL_SAMPLE_NEAREST};
     bool ok = pass_screen(run,
         &(struct pass_screen){.name = slot == SCRATCH_HARD ? "hard shadows" : "penumbra axes",
             .body = body,
             .defines = border ? "#define WITH_BORDER\n" : NULL,
-            .shadow = &map->textures[0],
+            .shadow = &inputs->map->textures[0],
             .textures = &pyramid,
             .texture_count = 1,
+            .tiles = inputs->tiles,
             .framebuffer = framebuffer},
         error);
     gl.DeleteFramebuffers(1, &framebuffer);
     return ok;
+}
+
+/* The hard shadow buffer. `border`: only this face's, with what lies beyond its border; otherwise
+ * it joins the light's other faces. */
+static bool write_hard(
+    struct technique_run *run, struct inputs *inputs, bool border, struct pen_error *error)
+{
+    static const float lit[4] = {1};
+    const struct erosion *params = run->params;
+    const struct gl_texture *hard = pass_scratch(run, SCRATCH_HARD, GL_RGBA16F, 1);
+    inputs->map = pass_caster_map(run, params->map_size, error);
+    inputs->min_max = inputs->map ? pass_caster_min_max(run, params->map_size, error) : NULL;
+    if (!inputs->min_max)
+        return false;
+    if (border || pass_is_first_face(run))
+        pass_scratch_clear(hard, lit);
+    return pass_penumbra_tiles(
+               run, inputs->min_max, params->min_filter + 1, hard, &inputs->tiles, error) &&
+           write_scratch(run, SCRATCH_HARD, "erosion_hard.glsl", inputs, border, error);
 }
 
 struct fill {
@@ -121,33 +145,34 @@ static bool build_edge_pyramid(struct technique_run *run, const struct gl_textur
     return true;
 }
 
-static bool record_pcf(
-    struct technique_run *run, const struct shadow_input *map, struct pen_error *error)
+static bool record_pcf(struct technique_run *run, struct pen_error *error)
 {
-    static const float lit[4] = {1};
     const struct erosion *params = run->params;
     const struct gl_texture *hard = pass_scratch(run, SCRATCH_HARD, GL_RGBA16F, 1);
     const struct gl_texture *pyramid = pass_scratch(run, SCRATCH_EDGES, GL_RGBA16F, 0);
+    struct inputs inputs;
     /* Each face filters its own receivers in its own map, so it needs its own edges, also those
      * that lie beyond its border. */
-    pass_scratch_clear(hard, lit);
-    if (!write_scratch(run, SCRATCH_HARD, "erosion_hard.glsl", map, true, error) ||
-        !build_edge_pyramid(run, hard, pyramid, error))
+    if (!write_hard(run, &inputs, true, error) || !build_edge_pyramid(run, hard, pyramid, error))
         return false;
     struct pass_texture textures[] = {{UNIT_FREE, hard->name, GL_SAMPLE_NEAREST},
         {UNIT_FREE + 1, pyramid->name, GL_SAMPLE_TRILINEAR}};
     struct pass_screen pass = {.name = "erosion",
         .body = "erosion.glsl",
-        .shadow = &map->textures[0],
+        .shadow = &inputs.map->textures[0],
         .textures = textures,
-        .texture_count = 2};
-    return params->smooth.on ? pass_interleaved(run, &pass, error) : pass_screen(run, &pass, error);
+        .texture_count = 2,
+        .tiles = inputs.tiles};
+    /* The average knows nothing of other faces. */
+    bool smooth = params->smooth.on && !run->face->cube;
+    return smooth ? pass_interleaved(run, &pass, error) : pass_screen(run, &pass, error);
 }
 
 static bool fit_lines(struct technique_run *run, struct pen_error *error)
 {
     const struct gl_texture *scratch = run->ctx->scratch;
     const struct gl_texture *edges = pass_scratch(run, SCRATCH_ALL, GL_RG16F, 1);
+    const struct gl_texture *rough = pass_scratch(run, SCRATCH_ALL_NEXT, GL_RGBA16F, 1);
     const struct gl_texture *lines = pass_scratch(run, SCRATCH_LINES, GL_RGBA16F, 1);
     struct fill find = {.name = "edges",
         .fragment = "erosion_edges.frag",
@@ -156,10 +181,15 @@ static bool fit_lines(struct technique_run *run, struct pen_error *error)
         .texture_count = 1};
     struct fill fit = {.name = "line fit",
         .fragment = "erosion_lines.frag",
-        .target = lines,
+        .target = rough,
         .textures = {{UNIT_FREE, edges->name, GL_SAMPLE_NEAREST}},
         .texture_count = 1};
-    return fill(run, &find, error) && fill(run, &fit, error);
+    struct fill smooth = {.name = "line fit",
+        .fragment = "erosion_smooth.frag",
+        .target = lines,
+        .textures = {{UNIT_FREE, rough->name, GL_SAMPLE_NEAREST}},
+        .texture_count = 1};
+    return fill(run, &find, error) && fill(run, &fit, error) && fill(run, &smooth, error);
 }
 
 static bool flood(
@@ -169,6 +199,9 @@ static bool flood(
     const struct gl_texture *scratch = run->ctx->scratch;
     const struct gl_texture *pair[2] = {pass_scratch(run, SCRATCH_LIT, GL_RG16F, 1),
         pass_scratch(run, SCRATCH_LIT_NEXT, GL_RG16F, 1)};
+    static const float none[4] = {1e4f, 1e4f}; /* FAR in erosion_line.glsl */
+    pass_scratch_clear(pair[0], none);
+    pass_scratch_clear(pair[1], none);
     int32_t step = 1;
     while (2 * step < (int32_t)params->max_radius)
         step *= 2;
@@ -192,16 +225,13 @@ static bool flood(
     return true;
 }
 
-static bool record_direct(
-    struct technique_run *run, const struct shadow_input *map, struct pen_error *error)
+static bool record_direct(struct technique_run *run, struct pen_error *error)
 {
-    static const float lit[4] = {1};
     const struct gl_texture *hard = pass_scratch(run, SCRATCH_HARD, GL_RGBA16F, 1);
     const struct gl_texture *axes = pass_scratch(run, SCRATCH_AXES, GL_RGBA16F, 1);
-    if (pass_is_first_face(run))
-        pass_scratch_clear(hard, lit);
-    if (!write_scratch(run, SCRATCH_HARD, "erosion_hard.glsl", map, false, error) ||
-        !write_scratch(run, SCRATCH_AXES, "erosion_axes.glsl", map, false, error))
+    struct inputs inputs;
+    if (!write_hard(run, &inputs, false, error) ||
+        !write_scratch(run, SCRATCH_AXES, "erosion_axes.glsl", &inputs, false, error))
         return false;
     /* From here on nothing is left of light space: edges run on from face to face. */
     if (!pass_is_last_face(run))
@@ -211,20 +241,20 @@ static bool record_direct(
         return false;
     struct fill f = {.name = "erosion",
         .fragment = "erosion_direct.frag",
-        .textures = {{UNIT_FREE, hard->name, GL_SAMPLE_NEAREST},
+        .textures = {{UNIT_DEPTH, run->gbuffer->depth.name, GL_SAMPLE_NEAREST},
+            {UNIT_NORMAL, run->gbuffer->normal.name, GL_SAMPLE_NEAREST},
+            {UNIT_FREE, hard->name, GL_SAMPLE_NEAREST},
             {UNIT_FREE + 1, axes->name, GL_SAMPLE_NEAREST},
             {UNIT_FREE + 2, run->ctx->scratch[SCRATCH_LINES].name, GL_SAMPLE_NEAREST},
             {UNIT_FREE + 3, seeds->name, GL_SAMPLE_NEAREST}},
-        .texture_count = 4};
+        .texture_count = 6};
     return fill(run, &f, error);
 }
 
 static bool record(struct technique_run *run, struct pen_error *error)
 {
     const struct erosion *params = run->params;
-    const struct shadow_input *map = pass_caster_map(run, params->map_size, error);
-    return map && (params->variant == VARIANT_PCF ? record_pcf(run, map, error)
-                                                  : record_direct(run, map, error));
+    return params->variant == VARIANT_PCF ? record_pcf(run, error) : record_direct(run, error);
 }
 
 const struct technique technique_erosion = {

@@ -1,6 +1,8 @@
 // Klein et al. 2014, variant pcf: the penumbra grows from the edges of the hard shadow by their own
 // width, found in the edge pyramid, and percentage-closer filtering runs only there.
 #include "taps.glsl"
+#include "dither.glsl"
+#include "erosion_window.glsl"
 layout(binding = 7) uniform sampler2D hard_map;
 layout(binding = 8) uniform sampler2D edge_pyramid; // trilinear
 
@@ -16,16 +18,15 @@ float edge_within(ivec2 pixel, float radius)
             texelFetch(edge_pyramid, ivec2(a.x, b.y), level).x));
 }
 
-// Mean W of the edges around, by a tent of 5 x 5 filtered taps: the pyramid's maxima would show their
+// Mean W of the edges around, by a tent of 3 x 3 filtered taps: the pyramid's maxima would show their
 // blocks.
 float edge_mean(ivec2 pixel, float radius)
 {
-    float lod = max(log2(radius) - 1.0, 0.0);
+    float lod = max(log2(radius) - 0.6, 0.0);
     vec2 sum = vec2(1e-12, 0.0);
-    for (int i = 0; i < 25; i++) {
-        vec2 at = vec2(i % 5, i / 5) - 2.0;
-        vec2 tent = 1.0 - abs(at) / 3.0;
-        vec2 uv = (vec2(pixel) + 0.5 + 0.5 * radius * at) * view.viewport.zw;
+    for (int i = 0; i < 9; i++) {
+        vec2 at = vec2(i % 3, i / 3) - 1.0, tent = 1.0 - 0.5 * abs(at);
+        vec2 uv = (vec2(pixel) + 0.5 + 0.67 * radius * at) * view.viewport.zw;
         sum += tent.x * tent.y * textureLod(edge_pyramid, uv, lod).yz;
     }
     return sum.y / sum.x;
@@ -47,10 +48,15 @@ vec4 visibility(Surface s)
     vec2 inverse_size = 1.0 / (light.rect.zw - light.rect.xy), uv = light_uv(q);
     if (w > 0.0)
         w = min(edge_mean(s.pixel, radius), hard.z);
-    vec2 extent = max(light.extent * w, P(min_filter) * texel);
+    vec2 extent = max(window_extent * w, P(min_filter) * texel);
     ReceiverPlane plane = receiver_plane(s.p, s.n);
     float bias = P(bias) * s.p.z * light_depth_slope(s.p.z), lit = 0.0;
-    Taps taps = taps_begin(P(filter_taps), P(smooth) ? frame_shift(s.pixel) : vec2(0.5));
+#ifdef INTERLEAVED
+    vec2 shift = dither2(s.pixel, view.display.z);
+#else
+    vec2 shift = vec2(0.5);
+#endif
+    Taps taps = taps_begin(P(filter_taps), shift);
     for (int i = 0; i < count; i++) {
         vec2 offset = taps_next(taps) * extent;
         float d = texture(shadow_map, uv + offset * inverse_size).r;

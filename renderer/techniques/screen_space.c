@@ -26,7 +26,7 @@ static const struct pen_param rows[] = {
 static bool record(struct technique_run *run, struct pen_error *error)
 {
     const struct screen_space *params = run->params;
-    return pass_penumbra_spread(run, params->map_size, error) &&
+    return pass_penumbra_spread(run, params->map_size, params->min_filter, error) &&
            pass_penumbra_gauss(run, PENUMBRA_HARD, error);
 }
 

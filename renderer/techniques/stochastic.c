@@ -24,7 +24,7 @@ static const struct pen_param rows[] = {
     PENUMBRA_ROWS(struct stochastic, 12),
     PARAM(struct stochastic, levels, .def = 2, .min = 0, .max = 6,
         .help = "Levels of the a-trous filter; each doubles its reach."),
-    PARAM(struct stochastic, blur, .def = 0.5, .min = 0, .max = 4,
+    PARAM(struct stochastic, blur, .def = 0.6, .min = 0, .max = 4,
         .help = "Width of the filter over that of the penumbra."),
     FILTER_ROWS(struct stochastic),
 };
@@ -32,7 +32,7 @@ static const struct pen_param rows[] = {
 static bool record(struct technique_run *run, struct pen_error *error)
 {
     const struct stochastic *params = run->params;
-    return pass_penumbra_spread(run, params->map_size, error) &&
+    return pass_penumbra_spread(run, params->map_size, params->min_filter, error) &&
            pass_light_samples(run, params->maps, params->map_size, params->samples, error) &&
            pass_penumbra_atrous(run, params->levels, error);
 }

@@ -36,14 +36,15 @@ vec2 taps_next(inout Taps t)
     return p;
 }
 
-// One of 16 shifts, a different one for each pixel of every 4 x 4 block (Keller and Heidrich 2001).
-// The spiral also takes y as its first index, so it stays in (0, 1).
+// One of 16 shifts, a different one for each pixel of every 4 x 4 block (Keller and Heidrich 2001):
+// the Hammersley set of 16 points. Multiples of the R2 step would not do: a pattern shifted by them is
+// the same sequence further on, and 16 of those overlap almost entirely.
 vec2 interleaved_shift(ivec2 pixel)
 {
-    int k = (pixel.x & 3) | (pixel.y & 3) << 2;
-    // A 4 x 4 ordered-dither order, so that neighbours differ most.
-    int order = (k & 1) << 3 ^ (k & 4) << 1 | ((k >> 2 & 1) << 2) | (k & 2) ^ (k >> 2 & 2) | (k >> 3 & 1);
-    return fract(vec2(0.75487767, 0.56984029) * float(order) + 0.5 / 16.0);
+    // Bits of x and y interleaved, so that neighbours are far apart in the set.
+    uint order = uint((pixel.x & 1) << 3 | (pixel.y & 1) << 2 | (pixel.x & 2) | (pixel.y & 2) >> 1);
+    uint reversed = bitfieldReverse(order) >> 28;
+    return (vec2(order, reversed) + 0.5) / 16.0;
 }
 
 // Frame number folded in, so that jittered frames average different patterns.

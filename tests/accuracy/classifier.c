@@ -63,6 +63,9 @@ int main(int argc, char **argv)
         compare(half, name, HARNESS_VIEW HARNESS_RECT);
         compare(half, name, HARNESS_VIEW HARNESS_DISK);
     }
-    check_shares(half);
+    if (argc < 2 || !strcmp(argv[1], "pcss"))
+        check_shares(half);
+    if (argc > 1 && !pen_catalogue_find(catalogue, argv[1]))
+        return 77;
     CHECK_DONE();
 }

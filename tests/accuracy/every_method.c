@@ -73,5 +73,7 @@ int main(int argc, char **argv)
         check_finite(name, demo);
         check_finite(name, mask);
     }
+    if (argc > 1 && !pen_catalogue_find(catalogue, argv[1]))
+        return 77;
     CHECK_DONE();
 }

@@ -40,7 +40,7 @@ class Limits(unittest.TestCase):
         return d
 
     def heavy(self, n):
-        return dict(HEAVY, exposure_ev=n / 16, antialias=4)
+        return dict(HEAVY, exposure_ev=n / 16, antialias=2, deadline_ms=600000)
 
     def test_full_queue(self):
         d = self.daemon("--queue-limit=2", "--client-share=0")

@@ -84,6 +84,9 @@ int main(int argc, char **argv)
     printf("sample maps %u\n", result.shadow_maps);
     for (uint32_t i = 0; i < result.warning_count; i++)
         printf("warning: %s\n", result.warnings[i]);
+    const uint32_t *split = result.subdivided_pixels;
+    if (split[0] + split[1])
+        printf("subdivided  once %u, twice %u pixels\n", split[0], split[1]);
     if (!pen_encode(&frame, &request.output, NULL, 0, &bytes, &error))
         return report(&error);
     FILE *file = fopen(argv[2], "wb");

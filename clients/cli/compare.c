@@ -1,0 +1,253 @@
+#include "clients/cli/render.h"
+#include "clients/cli/request_args.h"
+#include "clients/cli/upload.h"
+#include <errno.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+
+#define DEADLINE_MS 600000
+
+static void help(void)
+{
+    puts(
+        "penumbra compare SCENE [--techniques all|NAME,NAME...] [options]\n"
+        "\n"
+        "Renders a view with several shadow methods and with a reference, and prints how far they\n"
+        "are from it (rmse: of the mean visibility; penumbra: the same where the reference lies\n"
+        "between 0.02 and 0.98; ssim, flip: of the picture) and what they cost in milliseconds\n"
+        "(shadow: its inputs and the method; total: with G-buffer and shading; nothing cached).\n"
+        "SCENE is as for penumbra render.\n"
+        "\n"
+        "  --techniques LIST                  all (default), or names joined by commas\n"
+        "  --reference NAME                   default: raytraced with 1024 samples\n"
+        "  --out DIR                          writes images, difference images, SSIM and FLIP\n"
+        "                                     maps and comparison.json there\n"
+        "  --json FILE                        the comparison as JSON (-: standard input); flags\n"
+        "                                     after it change it; techniques can have params here\n"
+        "  --json-record                      prints the server's answer instead of the table\n"
+        "  --light NAME=VALUE,NAME=VALUE...   adds a light; none: ambient light only\n"
+        "  --server URL, --retry N, -v        as for penumbra render\n");
+    cli_render_help();
+}
+
+struct options {
+    struct cli_server server;
+    const char *scene, *out;
+    bool record, help;
+};
+
+static void put_string(cJSON *root, const char *key, const char *value)
+{
+    cJSON_DeleteItemFromObjectCaseSensitive(root, key);
+    cJSON_AddStringToObject(root, key, value);
+}
+
+static void put_list(cJSON *root, const char *names)
+{
+    if (!strcmp(names, "all")) {
+        put_string(root, "techniques", names);
+        return;
+    }
+    cJSON_DeleteItemFromObjectCaseSensitive(root, "techniques");
+    cJSON *list = cJSON_AddArrayToObject(root, "techniques");
+    char *copy = cli_format("%s", names);
+    for (char *at = copy, *name; (name = strsep(&at, ","));)
+        if (*name)
+            cJSON_AddItemToArray(list, cJSON_CreateString(name));
+    free(copy);
+}
+
+static int parse(struct cli_args *args, struct options *options, cJSON *root)
+{
+    cli_server_init(&options->server);
+    while (args->at < args->count && args->status == CLI_OK) {
+        const char *value;
+        if (cli_common_option(args, &options->server) || cli_option(args, "out", &options->out))
+            continue;
+        if (cli_option(args, "techniques", &value)) {
+            if (args->status == CLI_OK)
+                put_list(root, value);
+        } else if (cli_option(args, "reference", &value)) {
+            if (args->status == CLI_OK)
+                put_string(root, "reference", value);
+        } else if (cli_flag(args, "json-record"))
+            options->record = true;
+        else if (cli_flag(args, "help") || cli_flag(args, "h"))
+            options->help = true;
+        else if (cli_request_option(args, root))
+            continue;
+        else if (!options->scene && (value = cli_positional(args)))
+            options->scene = value;
+        else
+            return cli_unknown(args, "compare");
+    }
+    if (args->status != CLI_OK || options->help)
+        return args->status;
+    if (!options->scene)
+        return cli_fail(CLI_USAGE, "Which scene? See penumbra compare --help.");
+    if (!cli_request_has(root, NULL, "deadline_ms"))
+        cJSON_AddNumberToObject(root, "deadline_ms", DEADLINE_MS);
+    return CLI_OK;
+}
+
+/* ---- the table ---- */
+
+static const cJSON *member(const cJSON *object, const char *key)
+{
+    return cJSON_GetObjectItemCaseSensitive(object, key);
+}
+
+static const char *text(const cJSON *item)
+{
+    return cJSON_IsString(item) ? item->valuestring : "";
+}
+
+static const char *name_of(const cJSON *row)
+{
+    return text(member(member(row, "technique"), "name"));
+}
+
+static void print_number(const cJSON *row, const char *key, int width, int digits)
+{
+    const cJSON *item = member(row, key);
+    if (cJSON_IsNumber(item))
+        printf("  %*.*f", width, digits, item->valuedouble);
+    else
+        printf("  %*s", width, "-");
+}
+
+static void print_row(const cJSON *row, int width)
+{
+    const cJSON *error = member(row, "error");
+    printf("%-*s", width, name_of(row));
+    if (cJSON_IsString(error)) {
+        printf("  %s\n", error->valuestring);
+        return;
+    }
+    print_number(row, "rmse", 8, 5);
+    print_number(row, "rmse_penumbra", 8, 5);
+    print_number(row, "ssim", 8, 5);
+    print_number(row, "flip", 8, 5);
+    print_number(row, "shadow_ms", 10, 2);
+    print_number(row, "total_ms", 10, 2);
+    putchar('\n');
+}
+
+static void print_warnings(const char *name, const cJSON *row)
+{
+    const cJSON *list = member(row, "warnings");
+    for (const cJSON *w = list ? list->child : NULL; w; w = w->next)
+        fprintf(stderr, "warning: %s%s%s\n", name, *name ? ": " : "", text(w));
+}
+
+static void print_table(const cJSON *answer)
+{
+    const cJSON *methods = member(answer, "methods"), *reference = member(answer, "reference");
+    int width = (int)strlen("method");
+    for (const cJSON *row = methods ? methods->child : NULL; row; row = row->next)
+        width = (int)strlen(name_of(row)) > width ? (int)strlen(name_of(row)) : width;
+    int of_reference = (int)strlen(name_of(reference));
+    width = of_reference > width ? of_reference : width;
+    printf("%-*s  %8s  %8s  %8s  %8s  %10s  %10s\n", width, "method", "rmse", "penumbra", "ssim",
+        "flip", "shadow ms", "total ms");
+    for (const cJSON *row = methods ? methods->child : NULL; row; row = row->next)
+        print_row(row, width);
+    print_row(reference, width);
+    print_warnings("", answer);
+    for (const cJSON *row = methods ? methods->child : NULL; row; row = row->next)
+        print_warnings(name_of(row), row);
+}
+
+/* ---- the folder ---- */
+
+static int save_row(const struct options *options, const cJSON *row, int number)
+{
+    static const struct {
+        const char *key, *ending;
+    } pictures[] = {
+        {"image", ""}, {"difference", "-difference"}, {"ssim_map", "-ssim"}, {"flip_map", "-flip"}};
+    int status = CLI_OK;
+    for (size_t i = 0; status == CLI_OK && i < sizeof pictures / sizeof *pictures; i++) {
+        const cJSON *href = member(member(row, "links"), pictures[i].key);
+        if (!cJSON_IsString(href) || href->valuestring[0] != '/')
+            continue;
+        char *path = number ? cli_format("%s/%02d-%s%s.png", options->out, number, name_of(row),
+                                  pictures[i].ending)
+                            : cli_format("%s/reference.png", options->out);
+        struct cli_call call = {.method = "GET",
+            .path = href->valuestring,
+            .accept = "image/png",
+            .doing = "fetching pictures"};
+        status = cli_save_image(&options->server, &call, path);
+        free(path);
+    }
+    return status;
+}
+
+static int save_all(const struct options *options, const cJSON *answer, const char *json)
+{
+    const cJSON *methods = member(answer, "methods");
+    if (mkdir(options->out, 0777) && errno != EEXIST)
+        return cli_fail(CLI_FAILED, "%s cannot be made.", options->out);
+    char *path = cli_format("%s/comparison.json", options->out);
+    FILE *file = fopen(path, "wb");
+    bool ok = file && fputs(json, file) >= 0;
+    if (file && fclose(file))
+        ok = false;
+    int status = ok ? CLI_OK : cli_fail(CLI_FAILED, "%s cannot be written.", path);
+    free(path);
+    if (status == CLI_OK)
+        status = save_row(options, member(answer, "reference"), 0);
+    int number = 1;
+    for (const cJSON *row = methods ? methods->child : NULL; row && status == CLI_OK;
+         row = row->next)
+        status = save_row(options, row, number++);
+    return status;
+}
+
+static int compare(const struct options *options, cJSON *root)
+{
+    const struct cli_server *server = &options->server;
+    char id[PEN_ID_HEX + 1];
+    int status = cli_upload_scene(server, options->scene, id, NULL);
+    if (status == CLI_OK)
+        status = cli_upload_textures(server, root);
+    if (status != CLI_OK)
+        return status;
+    char *body = cJSON_PrintUnformatted(root), *path = cli_format("/v1/scenes/%s/compare", id);
+    struct cli_call call = {.method = "POST",
+        .path = path,
+        .content_type = "application/json",
+        .body = body,
+        .doing = "comparing"};
+    struct cli_answer answer;
+    status = cli_call(server, &call, &answer);
+    cJSON *document = status == CLI_OK ? cli_answer_object(&answer) : NULL;
+    if (status == CLI_OK && !document)
+        status = CLI_SERVER;
+    if (status == CLI_OK && options->record)
+        puts(answer.text);
+    else if (status == CLI_OK)
+        print_table(document);
+    if (status == CLI_OK && options->out)
+        status = save_all(options, document, answer.text);
+    cJSON_Delete(document);
+    cli_answer_finish(&answer);
+    free(path);
+    free(body);
+    return status;
+}
+
+int cli_compare(struct cli_args *args)
+{
+    struct options options = {0};
+    cJSON *root = cJSON_CreateObject();
+    int status = parse(args, &options, root);
+    if (status == CLI_OK && options.help)
+        help();
+    else if (status == CLI_OK)
+        status = compare(&options, root);
+    cJSON_Delete(root);
+    return status;
+}

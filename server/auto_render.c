@@ -1,0 +1,410 @@
+#include "server/auto_render.h"
+#include "server/calibration.h"
+#include "server/clock.h"
+#include "server/compare.h"
+#include "server/hash.h"
+#include "server/log.h"
+#include "server/routes.h"
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define REFERENCE_SAMPLES 1024
+#define GPU_PIXELS (320u * 240u)      /* of the pictures whose error is measured */
+#define SOFTWARE_PIXELS (176u * 132u) /* the same, and of those that are timed */
+#define TIMED_PIXELS (2u << 20)       /* at most, on a GPU */
+#define REPEATS 5
+#define SLOW_MS 400 /* a candidate that takes longer is timed once */
+#define PATIENCE_MS 120000
+#define HISTORIES 64
+#define FORGET_NS (600 * CLOCK_S) /* a busy hour must not be held against a row for ever */
+#define MAX_RUNS 4                /* at the same time */
+#define MAX_STEPS (1 + AUTO_MAX_ROWS * (1 + REPEATS))
+
+/* One scene and view being measured, and the calls that wait for it. */
+struct run {
+    struct run *next;
+    struct service *service;
+    struct pen_device_info device;
+    uint8_t scene[PEN_ID_BYTES];
+    struct auto_table table;
+    struct call *waiting; /* guarded by auto_runs.lock */
+    uint32_t steps;
+    struct pen_request requests[MAX_STEPS];
+    uint32_t measures[MAX_STEPS];
+};
+
+/* How long a row's renders took lately. */
+struct history {
+    uint8_t key[PEN_ID_BYTES]; /* of view and row */
+    uint64_t last_ns;          /* 0: free */
+    struct auto_observed observed;
+};
+
+struct auto_runs {
+    pthread_mutex_t lock; /* guards what follows, and every run's calls */
+    struct run *first;
+    struct history histories[HISTORIES];
+};
+
+struct auto_runs *auto_runs_create(void)
+{
+    struct auto_runs *runs = calloc(1, sizeof *runs);
+    if (!runs)
+        abort();
+    pthread_mutex_init(&runs->lock, NULL);
+    return runs;
+}
+
+void auto_runs_destroy(struct auto_runs *runs)
+{
+    if (!runs)
+        return;
+    pthread_mutex_destroy(&runs->lock);
+    free(runs);
+}
+
+/* ---- choosing ---- */
+
+static void history_key(const struct auto_table *table, const struct auto_row *row,
+    const struct call *call, uint8_t key[PEN_ID_BYTES])
+{
+    struct hash *hash = hash_create();
+    const uint32_t size[2] = {call->request.width, call->request.height};
+    hash_add(hash, table->setup, sizeof table->setup);
+    hash_add(hash, row->key, strlen(row->key));
+    hash_add(hash, size, sizeof size);
+    hash_finish(hash, key);
+}
+
+static struct history *find_history(struct auto_runs *runs, const uint8_t key[PEN_ID_BYTES])
+{
+    for (int i = 0; i < HISTORIES; i++) {
+        struct history *h = &runs->histories[i];
+        if (h->last_ns && !memcmp(h->key, key, PEN_ID_BYTES))
+            return clock_now_ns() - h->last_ns < FORGET_NS ? h : NULL;
+    }
+    return NULL;
+}
+
+void auto_runs_observe(struct auto_runs *runs, const struct call *call, double ms)
+{
+    pthread_mutex_lock(&runs->lock);
+    struct history *h = find_history(runs, call->choice_key);
+    if (!h) { /* its own that is out of date, a free one, or the oldest */
+        h = &runs->histories[0];
+        for (int i = 0; i < HISTORIES; i++) {
+            struct history *other = &runs->histories[i];
+            bool own = !memcmp(other->key, call->choice_key, PEN_ID_BYTES);
+            if (own || other->last_ns < h->last_ns)
+                h = other;
+            if (own)
+                break;
+        }
+        memset(h, 0, sizeof *h);
+        memcpy(h->key, call->choice_key, PEN_ID_BYTES);
+    }
+    h->last_ns = clock_now_ns();
+    auto_observe(&h->observed, call->choice_ms, ms);
+    pthread_mutex_unlock(&runs->lock);
+}
+
+/* The table's times as renders of this size have borne them out; `factors` says how. */
+static void correct(struct call *call, struct auto_table *table, double factors[AUTO_MAX_ROWS])
+{
+    struct auto_runs *runs = call->service->auto_runs;
+    for (uint32_t i = 0; i < table->count; i++) {
+        uint8_t key[PEN_ID_BYTES];
+        history_key(table, &table->rows[i], call, key);
+        pthread_mutex_lock(&runs->lock);
+        const struct history *h = find_history(runs, key);
+        factors[i] = h ? auto_correction(&h->observed) : 1;
+        pthread_mutex_unlock(&runs->lock);
+        table->rows[i].fixed_ms *= factors[i];
+        table->rows[i].screen_ms *= factors[i];
+    }
+}
+
+/* Takes a method from the table and serves the call. */
+static void serve(struct call *call, const struct auto_table *measured)
+{
+    struct auto_table corrected = *measured, *table = &corrected;
+    double factors[AUTO_MAX_ROWS];
+    correct(call, table, factors);
+    struct auto_wish wish;
+    struct auto_pick pick;
+    struct pen_error error = {0};
+    memcpy(&wish, call->request.technique_params, sizeof wish);
+    uint64_t pixels = (uint64_t)call->request.width * call->request.height;
+    if (!auto_choose(table, &wish, pixels, &pick)) {
+        pen_fail(&error, PEN_INTERNAL, "/technique", "No method could be measured on this scene.");
+        routes_fail(call, &error, 0);
+        return;
+    }
+    auto_apply(auto_find(pick.row->key), call->service->catalogue, &call->request);
+    snprintf(call->choice, sizeof call->choice, "%s", pick.why);
+    call->choice_met = pick.met;
+    call->choice_ms = pick.predicted_ms / factors[pick.row - table->rows];
+    history_key(table, pick.row, call, call->choice_key);
+    routes_serve(call);
+}
+
+/* ---- measuring ---- */
+
+static void limit_pixels(struct pen_request *request, uint32_t most)
+{
+    double scale = sqrt((double)most / ((double)request->width * request->height));
+    if (scale >= 1)
+        return;
+    request->width = (uint32_t)fmax(1, round(request->width * scale));
+    request->height = (uint32_t)fmax(1, round(request->height * scale));
+}
+
+static void add_step(struct run *run, const struct pen_request *request, uint32_t measure)
+{
+    run->requests[run->steps] = *request;
+    run->measures[run->steps++] = measure;
+}
+
+/* The reference, then every candidate: its error, and its time a few times. */
+static void plan_steps(struct run *run, const struct pen_request *asked)
+{
+    const struct pen_catalogue *catalogue = run->service->catalogue;
+    bool software = run->device.software, textured = false;
+    struct pen_request small = *asked, timed = *asked;
+    const char *name = pen_catalogue_find(catalogue, "raytraced") ? "raytraced" : "multisample";
+    const struct auto_candidate reference = {name, {{"samples", REFERENCE_SAMPLES}}};
+    limit_pixels(&small, software ? SOFTWARE_PIXELS : GPU_PIXELS);
+    limit_pixels(&timed, software ? SOFTWARE_PIXELS : TIMED_PIXELS);
+    run->table.pixels = timed.width * timed.height;
+    small.output.format = PEN_PNG;
+    small.output.layer = PEN_LAYER_BEAUTY;
+    small.output.bit_depth = 0;
+    auto_apply(&reference, catalogue, &small);
+    add_step(run, &small, CHANNEL_REFERENCE);
+    for (uint32_t i = 0; i < asked->light_count; i++)
+        textured |= asked->lights[i].texture != PEN_TEXTURE_NONE;
+    for (uint32_t i = 0; i < auto_candidate_count && run->table.count < AUTO_MAX_ROWS; i++) {
+        const struct auto_candidate *candidate = &auto_candidates[i];
+        if (!auto_is_candidate(candidate, catalogue, textured, software))
+            continue;
+        auto_key(candidate, run->table.rows[run->table.count++].key);
+        auto_apply(candidate, catalogue, &small);
+        auto_apply(candidate, catalogue, &timed);
+        add_step(run, &small, CHANNEL_NUMBERS);
+        for (int k = 0; k < REPEATS; k++)
+            add_step(run, &timed, CHANNEL_PICTURE);
+    }
+}
+
+static double screen_ms(const struct pen_result *result)
+{
+    static const enum pen_stage stages[] = {PEN_STAGE_GBUFFER, PEN_STAGE_TECHNIQUE, PEN_STAGE_SHADE,
+        PEN_STAGE_READBACK, PEN_STAGE_ENCODE};
+    double ms = 0;
+    for (size_t i = 0; i < sizeof stages / sizeof *stages; i++)
+        ms += result->stage_ms[stages[i]];
+    return ms;
+}
+
+/* The row of one candidate from its steps; false when it could not be measured. Of the repeats the
+ * second slowest counts, near what nineteen of twenty stay below; the slowest is the one that met a
+ * program for the first time. They find their shadow inputs kept, which a request with another
+ * light does not: what these cost is added. */
+static bool read_row(const struct compare_row *steps, struct auto_row *row)
+{
+    const struct compare_row *slowest = NULL, *second = NULL;
+    if (steps[0].result.error.code != PEN_OK)
+        return false;
+    for (int k = 1; k <= REPEATS; k++) {
+        const struct compare_row *step = &steps[k];
+        if (step->result.error.code != PEN_OK || !(step->run_ms > 0))
+            continue;
+        if (!slowest || step->run_ms > slowest->run_ms) {
+            second = slowest;
+            slowest = step;
+        } else if (!second || step->run_ms > second->run_ms)
+            second = step;
+    }
+    const struct compare_row *typical = second ? second : slowest;
+    if (!typical)
+        return false;
+    row->rmse = steps[0].result.comparison.rmse;
+    row->screen_ms = fmin(screen_ms(&typical->result), typical->run_ms);
+    row->fixed_ms =
+        typical->run_ms - row->screen_ms -
+        fmin(typical->result.stage_ms[PEN_STAGE_SHADOW], typical->run_ms - row->screen_ms) +
+        steps[0].result.stage_ms[PEN_STAGE_SHADOW];
+    return true;
+}
+
+static void read_rows(struct run *run, const struct compare_row *steps)
+{
+    uint32_t candidates = run->table.count;
+    run->table.count = 0;
+    for (uint32_t i = 0; i < candidates; i++) {
+        struct auto_row row = run->table.rows[i];
+        if (read_row(&steps[1 + i * (1 + REPEATS)], &row))
+            run->table.rows[run->table.count++] = row;
+    }
+}
+
+/* Answers 504 to the calls whose time is up; the run goes on for the next ones. */
+static void expire_calls(struct run *run)
+{
+    struct auto_runs *runs = run->service->auto_runs;
+    struct call *late = NULL;
+    struct pen_error error = {0};
+    uint64_t now = clock_now_ns();
+    pthread_mutex_lock(&runs->lock);
+    for (struct call **at = &run->waiting; *at;) {
+        struct call *call = *at;
+        uint64_t deadline = call->exchange->body_ns + call->request.delivery.deadline_ms * CLOCK_MS;
+        if (deadline > now) {
+            at = &call->next_waiting;
+            continue;
+        }
+        *at = call->next_waiting;
+        call->next_waiting = late;
+        late = call;
+    }
+    pthread_mutex_unlock(&runs->lock);
+    pen_fail(&error, PEN_DEADLINE, "/deadline_ms",
+        "The scene is still being measured: ask again, or allow more time.");
+    while (late) {
+        struct call *call = late;
+        late = call->next_waiting;
+        routes_fail(call, &error, 0);
+    }
+}
+
+/* Leaves out what a slow candidate's first picture has told already. */
+static bool wants(void *owner, struct compare *compare, uint32_t step)
+{
+    struct run *run = owner;
+    const struct compare_row *rows = compare_rows(compare);
+    uint32_t repeat = (step - 1) % (1 + REPEATS), first = step - repeat;
+    expire_calls(run);
+    if (repeat && rows[first].result.error.code != PEN_OK)
+        return false;
+    return repeat < 2 || rows[first + 1].run_ms < SLOW_MS;
+}
+
+/* Any thread. */
+static void done(
+    void *owner, struct compare *compare, const struct pen_error *error, uint32_t retry_after_s)
+{
+    struct run *run = owner;
+    struct service *s = run->service;
+    struct auto_runs *runs = s->auto_runs;
+    if (error->code == PEN_OK) {
+        read_rows(run, compare_rows(compare));
+        if (run->table.count && !calibration_save(s->store, run->scene, &run->device, &run->table))
+            log_event(LOG_ERROR, "a calibration could not be written to the store");
+    }
+    if (compare)
+        compare_destroy(compare);
+    pthread_mutex_lock(&runs->lock);
+    struct run **at = &runs->first;
+    while (*at != run)
+        at = &(*at)->next;
+    *at = run->next;
+    pthread_mutex_unlock(&runs->lock);
+    expire_calls(run);
+    while (run->waiting) { /* nobody can join any more */
+        struct call *call = run->waiting;
+        run->waiting = call->next_waiting;
+        if (error->code == PEN_OK)
+            serve(call, &run->table);
+        else
+            routes_fail(call, error, retry_after_s);
+    }
+    free(run);
+}
+
+static void start(struct run *run)
+{
+    struct compare_plan plan = {.requests = run->requests,
+        .count = run->steps,
+        .measures = run->measures,
+        .patience_ms = PATIENCE_MS,
+        .wants = wants,
+        .done = done,
+        .owner = run};
+    struct pen_error error = {0};
+    uint32_t retry_after_s = 0;
+    if (compare_start(run->service->scheduler, &plan, &retry_after_s, &error))
+        return;
+    done(run, NULL, &error, retry_after_s);
+}
+
+/* Waits for a run that measures this view, or starts one. */
+static void wait_for_run(
+    struct call *call, const struct pen_device_info *device, const uint8_t setup[PEN_ID_BYTES])
+{
+    struct service *s = call->service;
+    struct auto_runs *runs = s->auto_runs;
+    struct pen_error error = {0};
+    struct run *fresh = calloc(1, sizeof *fresh);
+    if (!fresh)
+        abort();
+    call->is_deferred = true;
+    http_defer(call->exchange);
+    pthread_mutex_lock(&runs->lock);
+    struct run *run = runs->first;
+    uint32_t count = 0;
+    while (run && (memcmp(run->scene, call->id, PEN_ID_BYTES) ||
+                      memcmp(run->table.setup, setup, PEN_ID_BYTES))) {
+        run = run->next;
+        count++;
+    }
+    bool full = !run && count >= MAX_RUNS;
+    if (full) {
+        pthread_mutex_unlock(&runs->lock);
+        free(fresh);
+        pen_fail(&error, PEN_UNAVAILABLE, "", "%d scenes are being measured already.", MAX_RUNS);
+        routes_fail(call, &error, 2);
+        return;
+    }
+    if (!run) {
+        run = fresh;
+        run->service = s;
+        run->device = *device;
+        memcpy(run->scene, call->id, PEN_ID_BYTES);
+        memcpy(run->table.setup, setup, PEN_ID_BYTES);
+        plan_steps(run, &call->request);
+        run->next = runs->first;
+        runs->first = run;
+    }
+    call->next_waiting = run->waiting;
+    run->waiting = call;
+    pthread_mutex_unlock(&runs->lock);
+    if (run == fresh)
+        start(run);
+    else
+        free(fresh);
+}
+
+void routes_auto(struct call *call)
+{
+    struct service *s = call->service;
+    struct pen_device_info device;
+    struct auto_wish wish;
+    struct auto_table table;
+    uint8_t setup[PEN_ID_BYTES];
+    struct pen_error error = {0};
+    if (!service_device(s, &device)) {
+        pen_fail(&error, PEN_UNAVAILABLE, "", "The worker is still starting.");
+        routes_fail(call, &error, 1);
+        return;
+    }
+    memcpy(&wish, call->request.technique_params, sizeof wish);
+    calibration_setup(&call->request, setup);
+    /* An error is known only of a view that was measured; a time holds for others too. */
+    bool any = wish.budget_ms > 0 && !(wish.max_rmse > 0);
+    if (calibration_load(s->store, call->id, &device, setup, any, &table))
+        serve(call, &table);
+    else
+        wait_for_run(call, &device, setup);
+}

@@ -1,0 +1,21 @@
+/* What was measured of a scene on a device: the store's scenes/<id>/calibration-<device>.json. */
+#pragma once
+#include "protocol/result.h"
+#include "server/auto_choice.h"
+#include "server/scene_store.h"
+
+#define CALIBRATION_TABLES 16 /* views of one scene that are remembered */
+
+/* Hash of what error and cost depend on: view, shape of the picture, lights, ground, output; not
+ * the method, the size or the tones. */
+void calibration_setup(const struct pen_request *request, uint8_t setup[PEN_ID_BYTES]);
+
+/* The table of a view; with `any` the newest one when that view has none. False: nothing is known,
+ * or it was measured by another build or on another device. */
+bool calibration_load(struct scene_store *store, const uint8_t scene[PEN_ID_BYTES],
+    const struct pen_device_info *device, const uint8_t setup[PEN_ID_BYTES], bool any,
+    struct auto_table *table);
+/* Adds or replaces the table of its view; the oldest leaves when there are too many. One thread at
+ * a time. False when the store cannot be written. */
+bool calibration_save(struct scene_store *store, const uint8_t scene[PEN_ID_BYTES],
+    const struct pen_device_info *device, const struct auto_table *table);

@@ -1,0 +1,246 @@
+/* Adaptive light source subdivision: where it splits, what it converges to, both ways of counting.
+ */
+#include "renderer/passes/light_tree.h"
+#include "tests/accuracy/textured.h"
+#include "tests/unit/check.h"
+
+#define TOP_RED "e102000000000000000000000000000000000000000000000000000000000000"
+
+#define METHOD "technique=adaptive-sampling&"
+
+static void scene(uint32_t kind, float height, float half_size, uint8_t id[PEN_ID_BYTES])
+{
+    harness_scene(
+        &(struct pen_generated_options){
+            .kind = kind, .caster_height = height, .caster_half_size = half_size},
+        id);
+}
+
+static uint32_t pass_count(const struct shot *shot, const char *name)
+{
+    for (uint32_t i = 0; i < shot->result.pass_count; i++)
+        if (!strcmp(shot->result.passes[i].name, name))
+            return shot->result.passes[i].count;
+    return 0;
+}
+
+static double rmse_between(const struct shot *a, const struct shot *b)
+{
+    double sum = 0;
+    uint32_t n = a->width * a->height;
+    for (uint32_t i = 0; i < n; i++)
+        sum += pow(a->visibility[4 * i + 3] - b->visibility[4 * i + 3], 2);
+    return sqrt(sum / n);
+}
+
+static void check_no_caster(void)
+{
+    uint8_t id[PEN_ID_BYTES];
+    struct shot shot;
+    scene(PEN_GENERATED_PLANE, 0, 0, id);
+    static const char *const settings[] = {"", "&classify=off", "&count=occlusion_query"};
+    for (int i = 0; i < 3; i++) {
+        char text[512];
+        snprintf(text, sizeof text, METHOD "levels=4&threshold=0&" HARNESS_VIEW HARNESS_RECT "%s",
+            settings[i]);
+        harness_shot(id, text, &shot);
+        CHECK(shot.result.shadow_maps == 4);
+        CHECK(harness_deviation(&shot, truth_one, NULL).worst == 0);
+        harness_shot_finish(&shot);
+    }
+}
+
+/* Samples of the tree whose quads are split wherever the line u = cut (of [0, 1]) runs through
+ * them. */
+static uint32_t samples_along(double cut, uint32_t levels)
+{
+    struct light_tree tree;
+    light_tree_begin(&tree);
+    for (uint32_t q = 0; q < tree.count; q++) {
+        double low = tree.quads[q].x / 16.0, high = low + 1.0 / (1 << tree.quads[q].level);
+        if (tree.quads[q].level < levels && low < cut && cut < high)
+            light_tree_split(&tree, q);
+    }
+    return tree.used_count;
+}
+
+/* T1 through a window so narrow that the edge's image on the light stays in one of its sixteen
+ * columns: light point u hides behind the edge where u = 1/2 - 1.5 x. */
+static void check_edge(void)
+{
+    static const double cuts[] = {0.21875, 0.59375, 0.96875}; /* centres of columns of 1/16 */
+    uint8_t id[PEN_ID_BYTES];
+    scene(PEN_GENERATED_HALF_PLANE, 1.2f, 0, id);
+    for (int i = 0; i < 3; i++) {
+        struct shot shots[2];
+        double x = (0.5 - cuts[i]) / 1.5;
+        for (int query = 0; query < 2; query++) {
+            char text[640];
+            snprintf(text, sizeof text,
+                METHOD "levels=4&threshold=0&kernel=1&map_size=1024&count=%s&width=64&height=64"
+                       "&ground=off&camera.eye=%.5f,0.1,0&camera.target=%.5f,0,0&camera.up=0,0,-1"
+                       "&camera.fov_y_deg=8" HARNESS_RECT,
+                query ? "occlusion_query" : "atomic", x, x);
+            harness_shot(id, text, &shots[query]);
+        }
+        const struct shot *shot = &shots[0];
+        uint32_t expected = samples_along(cuts[i], 4), mirrored = samples_along(1 - cuts[i], 4);
+        fprintf(stderr, "edge at %.4f of the light: %u samples, expected %u\n", cuts[i],
+            shot->result.shadow_maps, expected);
+        CHECK(expected == mirrored); /* so the light's x axis may point either way */
+        CHECK(shot->result.shadow_maps == expected);
+        CHECK(expected < 150);
+        /* Columns of equal weight on both sides of the cut, half of the one that it runs through.
+         */
+        for (uint32_t k = 0; k < shot->width * shot->height; k++)
+            CHECK_NEAR(shot->visibility[4 * k + 3], 1 - cuts[i], 1.0 / 32 + 1e-3);
+        CHECK(shots[1].result.shadow_maps == shot->result.shadow_maps);
+        CHECK(!memcmp(shots[1].visibility, shot->visibility, 16 * shot->width * shot->height));
+        harness_shot_finish(&shots[0]);
+        harness_shot_finish(&shots[1]);
+    }
+}
+
+/* A caster between the corners' views, which all see past it. */
+static void check_thin(void)
+{
+    uint8_t id[PEN_ID_BYTES];
+    struct planar_case t = {.c = 1.2, .h = 3, .a = 0.5, .s = 0.07};
+    double rmse[3];
+    scene(PEN_GENERATED_SQUARE, 1.2f, 0.07f, id);
+    for (uint32_t level = 0; level < 3; level++) {
+        char text[512];
+        struct shot shot;
+        snprintf(text, sizeof text,
+            METHOD "min_level=%u&width=64&height=64&ground=off&camera.eye=0,0.1,0"
+                   "&camera.target=0,0,0&camera.up=0,0,-1&camera.fov_y_deg=50" HARNESS_RECT,
+            level);
+        harness_shot(id, text, &shot);
+        rmse[level] = harness_deviation(&shot, truth_square, &t).rmse;
+        fprintf(stderr, "thin caster, forced level %u: %u maps, rmse %.4f\n", level,
+            shot.result.shadow_maps, rmse[level]);
+        CHECK((shot.result.shadow_maps == 4) == (level == 0));
+        harness_shot_finish(&shot);
+    }
+    CHECK(rmse[1] < 0.5 * rmse[0] && rmse[1] < 0.04);
+}
+
+/* Against 256 fixed samples, and the closed forms for a full tree. */
+static void check_convergence(void)
+{
+    uint8_t id[PEN_ID_BYTES];
+    struct planar_case t = {.c = 1.2, .h = 3, .a = 0.5, .s = 0.4};
+    struct shot ours, reference;
+    scene(PEN_GENERATED_DEMO, 0, 0, id);
+    harness_shot(id, METHOD "width=320&height=240", &ours);
+    harness_shot(
+        id, "technique=multisample&samples=256&map_size=512&width=320&height=240", &reference);
+    fprintf(stderr, "demo: %u maps, rmse %.5f from %u fixed samples\n", ours.result.shadow_maps,
+        rmse_between(&ours, &reference), reference.result.shadow_maps);
+    harness_shot_finish(&ours);
+    harness_shot_finish(&reference);
+
+    static const char small[] =
+        "width=256&height=256&ground=off&camera.eye=0,0.48,0&camera.target=0,0,0&camera.up=0,0,-1"
+        "&camera.fov_y_deg=90&light.type=rect&light.position=0,3,0&light.target=0,0,0"
+        "&light.up=0,0,-1&light.width=0.1&light.height=0.1";
+    char text[640];
+    scene(PEN_GENERATED_SQUARE, 0.5f, 0.2f, id);
+    snprintf(text, sizeof text, "technique=multisample&samples=256&map_size=1024&%s", small);
+    harness_shot(id, text, &reference);
+    snprintf(text, sizeof text, METHOD "levels=4&map_size=1024&threshold=1&%s", small);
+    harness_shot(id, text, &ours);
+    double rmse = rmse_between(&ours, &reference);
+    fprintf(stderr, "small light: %u maps, rmse %.5f from %u fixed samples\n",
+        ours.result.shadow_maps, rmse, reference.result.shadow_maps);
+    CHECK(rmse < 0.01);
+    CHECK(ours.result.shadow_maps > 9);
+    CHECK(ours.result.shadow_maps < reference.result.shadow_maps / 2);
+    harness_shot_finish(&ours);
+    harness_shot_finish(&reference);
+
+    static const struct {
+        uint32_t kind;
+        const char *light;
+        truth_function truth;
+        double limit;
+    } cases[] = {{PEN_GENERATED_HALF_PLANE, HARNESS_RECT, truth_half_plane, 0.012},
+        {PEN_GENERATED_SQUARE, HARNESS_RECT, truth_square, 0.02},
+        {PEN_GENERATED_HALF_PLANE, HARNESS_DISK, truth_half_plane_disk, 0.012}};
+    for (int i = 0; i < 3; i++) {
+        scene(cases[i].kind, 1.2f, 0.4f, id);
+        snprintf(
+            text, sizeof text, METHOD "levels=4&map_size=960&" HARNESS_VIEW "%s", cases[i].light);
+        harness_shot(id, text, &ours);
+        struct deviation d = harness_deviation(&ours, cases[i].truth, &t);
+        fprintf(stderr, "T%d: rmse %.5f penumbra %.5f mean %+.5f, %u maps\n", i + 1, d.rmse,
+            d.rmse_penumbra, d.mean, ours.result.shadow_maps);
+        CHECK(d.rmse < cases[i].limit);
+        CHECK(fabs(d.mean) < 0.003);
+        harness_shot_finish(&ours);
+    }
+}
+
+/* Both ways of counting choose the same samples; maps are kept, also while the camera moves. */
+static void check_counting_and_keeping(void)
+{
+    uint8_t id[PEN_ID_BYTES];
+    struct shot shots[3];
+    scene(PEN_GENERATED_DEMO, 0, 0, id);
+    static const char *const settings[] = {METHOD "width=240&height=180",
+        METHOD "width=240&height=180&count=occlusion_query",
+        METHOD "width=240&height=180&camera.orbit.azimuth_deg=33"};
+    for (int i = 0; i < 3; i++)
+        harness_shot(id, settings[i], &shots[i]);
+    fprintf(stderr, "atomic %u, occlusion queries %u, moved %u maps\n", shots[0].result.shadow_maps,
+        shots[1].result.shadow_maps, shots[2].result.shadow_maps);
+    CHECK(shots[0].result.shadow_maps > 4);
+    CHECK(shots[0].result.shadow_maps == shots[1].result.shadow_maps);
+    CHECK(!memcmp(shots[0].visibility, shots[1].visibility, 16 * shots[0].width * shots[0].height));
+    CHECK(shots[1].result.shadow_inputs_reused);
+    CHECK(pass_count(&shots[1], "sample maps") == 0);
+    CHECK(shots[2].result.shadow_maps > 4);
+    CHECK(pass_count(&shots[2], "sample maps") == 0 || !shots[2].result.shadow_inputs_reused);
+    CHECK(pass_count(&shots[2], "sample maps") < 4);
+    for (int i = 0; i < 3; i++)
+        harness_shot_finish(&shots[i]);
+}
+
+/* T5: a light of two colours, along both axes and both ways. */
+static void check_textured(void)
+{
+    uint8_t id[PEN_ID_BYTES];
+    static const uint8_t red_green[2 * 4] = {255, 0, 0, 255, 0, 255, 0, 255};
+    static const struct planar_case t = {.c = 1.2, .h = 3, .a = 0.5};
+    uint8_t image[PEN_ID_BYTES];
+    textured_image(2, 1, 2, 1, red_green, image); /* top red */
+    scene(PEN_GENERATED_HALF_PLANE, 1.2f, 0, id);
+    for (int i = 0; i < 4; i++) {
+        int axis = i >> 1, sign = i & 1 ? 1 : -1;
+        char text[640];
+        struct shot shot;
+        double worst;
+        snprintf(text, sizeof text, METHOD HARNESS_VIEW "%s&light.texture.%s",
+            textured_light(axis, sign), axis ? "image=" TOP_RED : "pattern=two-colour");
+        harness_shot(id, text, &shot);
+        double rmse = textured_t5(&shot, &t, axis ? sign > 0 : sign < 0, &worst);
+        fprintf(stderr, "T5 axis %d%+d: rmse %.5f worst %.4f\n", axis, sign, rmse, worst);
+        CHECK(rmse < 0.03);
+        for (uint32_t k = 0; k < shot.width * shot.height;
+             k++) /* half the light is red, half green */
+            CHECK_NEAR(shot.visibility[4 * k] + shot.visibility[4 * k + 1],
+                shot.visibility[4 * k + 3], 0.06);
+        harness_shot_finish(&shot);
+    }
+}
+
+int main(void)
+{
+    check_textured();
+    check_no_caster();
+    check_edge();
+    check_thin();
+    check_convergence();
+    check_counting_and_keeping();
+    CHECK_DONE();
+}

@@ -1,0 +1,4 @@
+penumbra_accuracy_test(cascaded)
+target_link_libraries(accuracy_cascaded PRIVATE penumbra_textured)
+penumbra_accuracy_test(adaptive_sampling)
+target_link_libraries(accuracy_adaptive_sampling PRIVATE penumbra_textured)

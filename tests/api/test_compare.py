@@ -1,0 +1,317 @@
+"""POST /v1/scenes/{id}/compare: figures against an independent reading of the pictures, errors."""
+import json
+import os
+import signal
+import struct
+import threading
+import unittest
+import zlib
+
+import harness
+from harness import Daemon, grid_scene
+
+VIEW = {"width": 96, "height": 72, "ground": True,
+        "camera": {"eye": [0, 2.0, 1.6], "target": [0, 0.1, 0], "fov_y_deg": 50},
+        "lights": [{"type": "rect", "position": [0.6, 2.5, 0.4], "target": [0, 0, 0],
+                    "width": 0.8, "height": 0.8, "power_w": 60}],
+        "deadline_ms": int(60000 * harness.SLOW)}
+REFERENCE = {"name": "multisample", "params": {"samples": 128}}
+
+
+def caster_scene():
+    """The grid, and a speck of it half a metre lower, so that the ground lies there."""
+    data = grid_scene(2, "compare")
+    size, = struct.unpack("<I", data[12:16])
+    document = json.loads(data[20:20 + size])
+    document["nodes"].append({"mesh": 0, "scale": [0.01, 0.01, 0.01], "translation": [0, -0.005, 0]})
+    document["scenes"][0]["nodes"] = [0, 1]
+    return harness.glb(document, data[28 + size:])
+
+
+def read_png(data):
+    """Width, height and RGB rows of an 8-bit PNG without interlace."""
+    assert data[:8] == b"\x89PNG\r\n\x1a\n"
+    at, packed = 8, b""
+    while at < len(data):
+        size, = struct.unpack(">I", data[at:at + 4])
+        kind, body = data[at + 4:at + 8], data[at + 8:at + 8 + size]
+        if kind == b"IHDR":
+            width, height, depth, colour = struct.unpack(">IIBB", body[:10])
+            assert depth == 8 and colour in (0, 2, 6)
+        elif kind == b"IDAT":
+            packed += body
+        at += size + 12
+    n = {0: 1, 2: 3, 6: 4}[colour]
+    raw, rows, before = zlib.decompress(packed), [], bytearray(width * n)
+    for y in range(height):
+        mode, line = raw[y * (width * n + 1)], bytearray(
+            raw[y * (width * n + 1) + 1:(y + 1) * (width * n + 1)])
+        for i in range(width * n):
+            left = line[i - n] if i >= n else 0
+            up, corner = before[i], before[i - n] if i >= n else 0
+            p = left + up - corner
+            paeth = min((abs(p - left), 0, left), (abs(p - up), 1, up),
+                        (abs(p - corner), 2, corner))[2]
+            line[i] = (line[i] + (0, left, up, (left + up) // 2, paeth)[mode]) & 255
+        rows.append([tuple(line[i:i + n]) for i in range(0, width * n, n)])
+        before = line
+    return width, height, rows
+
+
+class Compare(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.d = Daemon()
+        cls.id = cls.d.upload(caster_scene())
+
+    @classmethod
+    def tearDownClass(cls):
+        status = cls.d.stop()
+        assert status == 0, status
+        cls.d.kill()
+
+    def compare(self, body, status=200):
+        answer = self.d.call("POST", "/v1/scenes/%s/compare" % self.id, json.dumps(body),
+                             {"Content-Type": "application/json"})
+        self.assertEqual(answer.status, status, answer.body)
+        return answer.json()
+
+    def picture(self, href):
+        answer = self.d.get(href)
+        self.assertEqual(answer.status, 200)
+        self.assertEqual(answer.headers["Content-Type"], "image/png")
+        return read_png(answer.body)[2]
+
+    def test_figures(self):
+        methods = ["hard", "pcss", REFERENCE, {"name": "multisample", "params": {"samples": 4}}]
+        answer = self.compare({**VIEW, "techniques": methods, "reference": REFERENCE})
+        hard, pcss, same, few = answer["methods"]
+        self.assertEqual([m["technique"]["name"] for m in answer["methods"]],
+                         ["hard", "pcss", "multisample", "multisample"])
+        self.assertEqual(answer["reference"]["technique"]["params"]["samples"], 128)
+        # The reference against itself.
+        self.assertEqual((same["rmse"], same["flip"], same["mean_error"]), (0, 0, 0))
+        self.assertAlmostEqual(same["ssim"], 1, places=6)
+        # More samples are nearer, and soft is nearer than hard.
+        self.assertLess(pcss["rmse"], 0.5 * hard["rmse"])
+        self.assertLess(few["rmse_penumbra"], hard["rmse_penumbra"])
+        for m in (hard, pcss, few):
+            self.assertGreater(m["rmse_penumbra"], m["rmse"])
+            self.assertGreater(m["penumbra_pixels"], 50)
+            self.assertLess(m["ssim"], 1)
+            self.assertGreater(m["flip"], 0)
+            self.assertGreater(m["shadow_ms"], 0)
+            self.assertGreaterEqual(m["total_ms"], m["shadow_ms"])
+            self.assertTrue(any(p["stage"] == "technique" for p in m["passes"]), m["passes"])
+
+    def test_figures_are_those_of_the_renders(self):
+        """RMSE anew from 16-bit pictures of the visibility that ordinary renders give."""
+        answer = self.compare({**VIEW, "techniques": ["hard"], "reference": REFERENCE})
+        planes = []
+        for technique in ("hard", REFERENCE):
+            image = self.d.render(self.id, {**VIEW, "technique": technique,
+                                            "output": {"layer": "visibility"}})
+            self.assertEqual(image.status, 200)
+            rows = read_png(image.body)[2]
+            # The light is white: its colour channels are the mean visibility.
+            planes.append([p[0] / 255 for row in rows for p in row])
+        square = sum((a - b) ** 2 for a, b in zip(*planes)) / len(planes[0])
+        self.assertAlmostEqual(answer["methods"][0]["rmse"], square ** 0.5, delta=2e-3)
+
+    def test_pictures(self):
+        answer = self.compare({**VIEW, "techniques": ["hard", REFERENCE], "reference": REFERENCE})
+        hard, same = answer["methods"]
+        # The picture is the one that a render gives, to one step of 255.
+        shown = self.picture(hard["links"]["image"])
+        image = self.d.render(self.id, {**VIEW, "technique": "hard"})
+        rendered = read_png(image.body)[2]
+        worst = max(abs(a - b) for r, s in zip(shown, rendered) for p, q in zip(r, s)
+                    for a, b in zip(p[:3], q[:3]))
+        self.assertLessEqual(worst, 1)
+        white = {(255, 255, 255)}
+        self.assertEqual({p[:3] for r in self.picture(same["links"]["difference"]) for p in r},
+                         white)
+        self.assertEqual({p[:3] for r in self.picture(same["links"]["ssim_map"]) for p in r}, white)
+        self.assertEqual({p[:3] for r in self.picture(same["links"]["flip_map"]) for p in r},
+                         {(0, 0, 0)})
+        # Hard shadows are too light in one half of a penumbra and too dark in the other.
+        difference = [p for r in self.picture(hard["links"]["difference"]) for p in r]
+        self.assertTrue(any(p[0] == 255 and p[1] < 100 for p in difference))
+        self.assertTrue(any(p[2] == 255 and p[1] < 100 for p in difference))
+
+    def test_wrong_scale_shows(self):
+        """A penumbra of half its width, as from a light of half its size, is far from the truth."""
+        light = {**VIEW["lights"][0], "width": 0.4, "height": 0.4}
+        planes = []
+        for lights, technique in ((VIEW["lights"], REFERENCE), (VIEW["lights"], "pcss"),
+                                  ([light], "pcss")):
+            image = self.d.render(self.id, {**VIEW, "lights": lights, "technique": technique,
+                                            "output": {"layer": "visibility"}})
+            planes.append([p[0] / 255 for row in read_png(image.body)[2] for p in row])
+        right, wrong = (sum((a - b) ** 2 for a, b in zip(planes[0], p)) for p in planes[1:])
+        self.assertGreater(wrong, 2.5 * right)
+
+    def test_default_reference(self):
+        answer = self.compare({**VIEW, "width": 32, "height": 24, "techniques": ["hard"]})
+        reference = answer["reference"]["technique"]
+        self.assertEqual(reference["params"]["samples"], 1024)
+        names = [t["name"] for t in self.d.get("/v1/techniques").json()["techniques"]]
+        if "raytraced" in names:
+            self.assertEqual((reference["name"], answer["warnings"]), ("raytraced", []))
+        else:
+            self.assertEqual(reference["name"], "multisample")
+            self.assertIn("raytraced", answer["warnings"][0])
+
+    def test_all(self):
+        answer = self.compare({**VIEW, "width": 32, "height": 24, "techniques": "all",
+                               "reference": {"name": "multisample", "params": {"samples": 16}}})
+        names = [t["name"] for t in self.d.get("/v1/techniques").json()["techniques"]]
+        compared = [m["technique"]["name"] for m in answer["methods"]]
+        self.assertEqual(set(compared), set(names) - {"multisample", "auto"})
+        self.assertEqual([m for m in answer["methods"] if "error" in m], [])
+
+    def test_refused(self):
+        for body, pointer in (
+                ({"techniques": []}, "/techniques"),
+                ({"techniques": "some"}, "/techniques"),
+                ({"techniques": ["hard", "nothing"]}, "/techniques/1"),
+                ({"techniques": [{"name": "pcss", "params": {"filter_taps": -1}}]},
+                 "/techniques/0/params/filter_taps"),
+                ({"reference": {"name": "none", "params": {"x": 1}}}, "/reference/params/x"),
+                ({"technique": "pcss"}, "/technique"),
+                ({"output": {"layer": "depth"}}, "/output"),
+                ({"width": 4000, "height": 4000}, "/width"),
+                ({"wide": 1}, "/wide")):
+            problem = self.compare(body, 422)
+            self.assertEqual(problem.get("pointer"), pointer, problem)
+        self.assertEqual(self.compare([], 422)["status"], 422)
+        missing = self.d.call("POST", "/v1/scenes/%s/compare" % ("0" * 64), "{}",
+                              {"Content-Type": "application/json"})
+        self.assertEqual(missing.status, 404)
+
+    def test_deadline(self):
+        problem = self.compare({**VIEW, "deadline_ms": 1}, 504)
+        self.assertEqual(problem["pointer"], "/deadline_ms")
+        # Nothing is left behind that would keep others from being served.
+        image = self.d.render(self.id, {**VIEW, "technique": "hard"})
+        self.assertEqual(image.status, 200)
+
+    def test_worker_dies(self):
+        """A measurement is given to the next worker, like any render."""
+        pid = self.d.worker()
+        killer = threading.Timer(0.15, lambda: os.kill(pid, signal.SIGKILL))
+        killer.start()
+        answer = self.compare({**VIEW, "techniques": ["hard", "pcf", "pcss", "vsm", "cssm"],
+                               "reference": REFERENCE})
+        killer.join()
+        self.assertEqual(len([m for m in answer["methods"] if m.get("rmse", 0) > 0]), 5)
+
+
+class Auto(unittest.TestCase):
+    """"technique": "auto" measures once and then chooses."""
+    @classmethod
+    def setUpClass(cls):
+        cls.d = Daemon()
+        cls.id = cls.d.upload(caster_scene())
+        cls.d.worker()
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.d.kill()
+
+    def record(self, wish, **more):
+        answer = self.d.render(
+            self.id, {**VIEW, "technique": {"name": "auto", "params": wish}, **more},
+            fresh=False, Accept="application/json")
+        self.assertEqual(answer.status, 200, answer.body)
+        return answer.json()
+
+    def files(self):
+        folder = os.path.join(self.d.store, "scenes", self.id)
+        return {name: os.path.getmtime(os.path.join(folder, name))
+                for name in os.listdir(folder) if name.startswith("calibration")}
+
+    def check_error(self, record, limit):
+        """Its error against raytraced, at the full size, by way of a comparison."""
+        request = record["request"]
+        compared = self.d.call(
+            "POST", "/v1/scenes/%s/compare" % self.id,
+            json.dumps({**VIEW, "techniques": [request["technique"]]}),
+            {"Content-Type": "application/json"}).json()
+        self.assertLessEqual(compared["methods"][0]["rmse"], limit)
+
+    def test_error(self):
+        chosen = {}
+        for limit in (0.3, 0.02, 0.005):
+            record = self.record({"max_rmse": limit})
+            chosen[limit] = record["request"]["technique"]["name"]
+            self.assertNotEqual(chosen[limit], "auto")
+            self.assertIn("max_rmse %g" % limit, record["choice"])
+            self.assertTrue(record["choice"].startswith(chosen[limit]))
+            self.check_error(record, limit)
+        self.assertIn(chosen[0.005], ("raytraced", "multisample", "cascaded", "bilateral"))
+
+    def test_measures_once(self):
+        self.record({"max_rmse": 0.05})
+        before = self.files()
+        self.assertEqual(len(before), 1)
+        renders = self.d.metric("penumbra_cache_misses_total")
+        again = self.record({"max_rmse": 0.05}, width=48, height=36)
+        self.assertEqual(self.files(), before)
+        self.assertLess(self.d.metric("penumbra_cache_misses_total") - renders, 3)
+        self.assertGreater(again["total_ms"], 0)
+        # Another view has another error: it is measured, and both are kept.
+        self.record({"max_rmse": 0.05}, camera={"orbit": {"azimuth_deg": 70}})
+        self.assertNotEqual(self.files(), before)
+
+    def test_budget(self):
+        wide = self.record({"budget_ms": 50000})
+        self.assertEqual(wide["warnings"], [])
+        self.assertIn("most accurate", wide["choice"])
+        # What nothing meets is served all the same, by what comes nearest, and said.
+        tight = self.record({"budget_ms": 0.01})
+        self.assertEqual(len(tight["warnings"]), 1)
+        self.assertIn("nothing meets", tight["warnings"][0])
+
+    def test_image(self):
+        """As an image: the header says what was taken, and the tag is that of the same request."""
+        path = "/v1/scenes/%s/render?technique=auto&max_rmse=0.1&width=64&height=48" % self.id
+        first = self.d.get(path)
+        self.assertEqual(first.status, 200)
+        self.assertEqual(first.headers["Content-Type"], "image/png")
+        self.assertIn("max_rmse 0.1", first.headers["X-Penumbra-Choice"])
+        again = self.d.get(path, If_None_Match=first.headers["ETag"])
+        self.assertEqual(again.status, 304)
+
+    def test_together(self):
+        """Requests that come while a view is being measured wait for the same measurement."""
+        camera = {"orbit": {"azimuth_deg": 200}}
+        records = []
+        threads = [threading.Thread(target=lambda: records.append(
+            self.record({"max_rmse": 0.1}, camera=camera))) for _ in range(3)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        self.assertEqual(len({r["choice"] for r in records}), 1)
+
+    def test_deadline(self):
+        """One that cannot wait is told so; the measurement goes on for the next."""
+        camera = {"orbit": {"azimuth_deg": 300}}
+        answer = self.d.render(self.id, {**VIEW, "technique": "auto", "camera": camera,
+                                         "deadline_ms": 1})
+        self.assertEqual(answer.status, 504, answer.body)
+        self.assertTrue(self.record({"max_rmse": 0.1}, camera=camera)["choice"])
+
+    def test_refused(self):
+        for params in ({"max_rmse": -1}, {"max_rmse": 2}, {"budget_ms": "1"}, {"speed": 1}):
+            answer = self.d.render(self.id, {"technique": {"name": "auto", "params": params}})
+            self.assertEqual(answer.status, 422)
+        answer = self.d.call("POST", "/v1/scenes/%s/compare" % self.id,
+                             json.dumps({"techniques": ["auto"]}),
+                             {"Content-Type": "application/json"})
+        self.assertEqual((answer.status, answer.json()["pointer"]), (422, "/techniques/0"))
+
+
+if __name__ == "__main__":
+    harness.main()

@@ -1,0 +1,112 @@
+"""What the claims bench and the comparison of methods share: running the plan, statistics."""
+import json
+import os
+import statistics
+import subprocess
+import sys
+
+from scenes import Scenes
+
+FRAME = ("gbuffer", "shadow", "technique", "shade")  # of one image, without reading it back
+METHOD = ("shadow", "technique")
+
+HERE = os.path.dirname(os.path.abspath(__file__))
+ROOT = os.path.dirname(os.path.dirname(os.path.dirname(HERE)))
+
+
+def import_scenes(build, folder):
+    """Imports the shared scenes once; without them the bench runs on generated scenes alone."""
+    shared = os.environ.get("PENUMBRA_SHARED") or os.path.join(ROOT, "..", "shared")
+    source = os.path.join(shared, "scenes")
+    if not os.path.isdir(source):
+        return
+    names = [name[:-4] for name in os.listdir(source) if name.endswith(".glb")]
+    if all(os.path.exists(os.path.join(folder, name + ".pscene")) for name in names):
+        return
+    subprocess.run([sys.executable, "-B", os.path.join(ROOT, "tests/accuracy/import_scenes.py"),
+                    os.path.join(build, "bin/penumbra-import"), source, folder], check=True,
+                   stdout=subprocess.DEVNULL)
+
+
+class Plan:
+    """Lines for penumbra-claims (plan.h)."""
+
+    def __init__(self, scene_folder):
+        self.scenes = Scenes(scene_folder)
+        self.groups = []
+
+    def group(self, name, scene, variants, settings="", repetitions=5, seconds=60, flags="p",
+              pairs=()):
+        """variants: {name: settings}; "reference" comes first."""
+        shared = "&".join(part for part in (self.scenes.use(scene), settings) if part)
+        lines = ["\t".join(["group", name, scene, str(repetitions), str(seconds), flags, shared])]
+        for key in sorted(variants, key=lambda key: key != "reference"):
+            lines.append("\t".join(["variant", key, variants[key]]))
+        lines += ["\t".join(["compare", *pair]) for pair in pairs]
+        self.groups.append("\n".join(lines + ["run"]))
+
+    def run(self, build, out, device="auto", log="results.jsonl"):
+        """Measures; answers (device, {group: result}). Every group is on disk once it is done."""
+        pictures = os.path.join(out, "pictures")
+        os.makedirs(pictures, exist_ok=True)
+        text = "\n".join(list(self.scenes.lines.values()) + self.groups) + "\n"
+        child = subprocess.Popen([os.path.join(build, "bin/penumbra-claims"), "--device", device,
+                                  "--out", pictures], stdin=subprocess.PIPE,
+                                 stdout=subprocess.PIPE, text=True)
+        child.stdin.write(text)
+        child.stdin.close()
+        results = []
+        with open(os.path.join(out, log), "w") as file:
+            for line in child.stdout:
+                file.write(line)
+                file.flush()
+                results.append(json.loads(line))
+        status = child.wait()
+        if status == 77:
+            sys.exit(77)
+        if status:
+            sys.exit("penumbra-claims ended with status %d" % status)
+        return results[0], {group["group"]: group for group in results[1:]}
+
+
+def failures(groups):
+    """Variants whose method exists but which did not render: the plan or the method is broken."""
+    return ["%s, %s: %s" % (group["group"], v["name"], v.get("message", ""))
+            for group in groups.values() for v in group["variants"] if v["status"] == "failed"]
+
+
+def read_results(path):
+    with open(path) as file:
+        results = [json.loads(line) for line in file]
+    return results[0], {group["group"]: group for group in results[1:]}
+
+
+def variant(group, name):
+    return next((v for v in group["variants"] if v["name"] == name), None)
+
+
+def comparison(group, test, reference="reference"):
+    return next((c for c in group["comparisons"]
+                 if c["test"] == test and c["reference"] == reference), None)
+
+
+def rounds(group, name, stages=FRAME, how="moving"):
+    """Milliseconds of each round; empty when it was not timed."""
+    found = variant(group, name)
+    times = found and found.get(how)
+    return [sum(values) for values in zip(*(times[stage] for stage in stages))] if times else []
+
+
+def spread(values):
+    """Median, lower and upper quartile."""
+    values = sorted(values)
+    if len(values) < 2:
+        return (values[0],) * 3 if values else None
+    low, middle, high = statistics.quantiles(values, n=4, method="inclusive")
+    return middle, low, high
+
+
+def ratios(group, numerator, denominator, stages=FRAME, how="moving"):
+    """Per round, so that what else the machine does falls on both."""
+    a, b = rounds(group, numerator, stages, how), rounds(group, denominator, stages, how)
+    return [x / y for x, y in zip(a, b) if y > 0]

@@ -1,0 +1,248 @@
+/* The policy of "auto", on tables made up for the purpose. */
+#include "server/auto_choice.h"
+#include "server/calibration.h"
+#include "tests/unit/check.h"
+
+static const struct pen_param sample_rows[] = {
+    {.name = "samples", .type = PEN_PARAM_UINT, .count = 1, .def = 8, .min = 1, .max = 4096}};
+static const struct pen_technique_info hard = {.name = "hard"};
+static const struct pen_technique_info pcss = {.name = "pcss"};
+static const struct pen_technique_info multisample = {
+    .name = "multisample", .textured = true, .struct_size = 4, .params = {sample_rows, 1}};
+static const struct pen_technique_info raytraced = {
+    .name = "raytraced", .textured = true, .struct_size = 4, .params = {sample_rows, 1}};
+
+static const struct auto_table table = {.pixels = 10000,
+    .count = 4,
+    .rows = {{"hard", .rmse = 0.10, .fixed_ms = 1, .screen_ms = 1},
+        {"pcss", .rmse = 0.03, .fixed_ms = 2, .screen_ms = 4},
+        {"bilateral", .rmse = 0.015, .fixed_ms = 60, .screen_ms = 1},
+        {"raytraced samples=64 seed=1", .rmse = 0.004, .fixed_ms = 1, .screen_ms = 40}}};
+
+static const char *choose(double max_rmse, double budget_ms, uint64_t pixels, bool *met)
+{
+    struct auto_wish wish = {(float)max_rmse, (float)budget_ms};
+    struct auto_pick pick;
+    CHECK(auto_choose(&table, &wish, pixels, &pick));
+    CHECK(strstr(pick.why, pick.row->key) != NULL);
+    CHECK_NEAR(pick.predicted_ms, auto_predict(&table, pick.row, pixels), 1e-9);
+    *met = pick.met;
+    return pick.row->key;
+}
+
+static void check_prediction(void)
+{
+    const struct auto_row *row = &table.rows[1];
+    CHECK_NEAR(auto_predict(&table, row, 10000), 6, 1e-9);
+    CHECK_NEAR(auto_predict(&table, row, 40000), 2 + 16, 1e-9);
+    /* A hundredth of the pixels saves half of the screen's time, no more. */
+    CHECK_NEAR(auto_predict(&table, row, 100), 2 + 0.5 * 4 * 1.01, 1e-9);
+}
+
+static void check_error(void)
+{
+    bool met;
+    CHECK_STR(choose(0.2, 0, 10000, &met), "hard");
+    CHECK(met);
+    CHECK_STR(choose(0.05, 0, 10000, &met), "pcss");
+    CHECK(met);
+    /* 0.03 itself is too near to 0.031: a quarter must be to spare. */
+    CHECK_STR(choose(0.031, 0, 10000, &met), "raytraced samples=64 seed=1");
+    CHECK_STR(choose(0.038, 0, 10000, &met), "pcss");
+    /* What is cheap depends on the size: fixed costs win on large pictures. */
+    CHECK_STR(choose(0.02, 0, 10000, &met), "raytraced samples=64 seed=1");
+    CHECK_STR(choose(0.02, 0, 100000, &met), "bilateral");
+    CHECK(met);
+    /* Neither asked: 0.02. */
+    CHECK_STR(choose(0, 0, 100000, &met), "bilateral");
+    /* Out of reach: the most accurate, and it says so. */
+    CHECK_STR(choose(0.001, 0, 10000, &met), "raytraced samples=64 seed=1");
+    CHECK(!met);
+}
+
+static void check_budget(void)
+{
+    bool met;
+    CHECK_STR(choose(0, 1000, 10000, &met), "raytraced samples=64 seed=1");
+    CHECK(met);
+    /* 41 ms are expected: 51 leave too little, 52 a fifth. */
+    CHECK_STR(choose(0, 51, 10000, &met), "pcss");
+    CHECK_STR(choose(0, 52, 10000, &met), "raytraced samples=64 seed=1");
+    CHECK_STR(choose(0, 7, 10000, &met), "hard");
+    CHECK(met);
+    CHECK_STR(choose(0, 1, 10000, &met), "hard");
+    CHECK(!met);
+    /* Four times the pixels. */
+    CHECK_STR(choose(0, 52, 40000, &met), "pcss");
+}
+
+static void check_both(void)
+{
+    bool met;
+    CHECK_STR(choose(0.05, 1000, 10000, &met), "pcss"); /* the cheapest that does, not the best */
+    CHECK(met);
+    CHECK_STR(choose(0.02, 20, 10000, &met), "pcss"); /* nothing does both: the budget holds */
+    CHECK(!met);
+    CHECK_STR(choose(0.02, 1, 10000, &met), "hard");
+    CHECK(!met);
+}
+
+static void check_observations(void)
+{
+    struct auto_observed seen = {0};
+    CHECK_NEAR(auto_correction(&seen), 1, 0);
+    for (int i = 0; i < 4; i++)
+        auto_observe(&seen, 10, 5);
+    CHECK_NEAR(auto_correction(&seen), 1, 0); /* too few to be trusted with good news */
+    auto_observe(&seen, 10, 20);
+    CHECK_NEAR(auto_correction(&seen), 2, 1e-6);
+    for (int i = 0; i < 35; i++)
+        auto_observe(&seen, 10, 5);
+    CHECK_NEAR(auto_correction(&seen), 0.5, 1e-6); /* one of forty */
+    for (int i = 0; i < 3; i++)
+        auto_observe(&seen, 10, 30);
+    CHECK_NEAR(auto_correction(&seen), 3, 1e-6); /* three of forty are more than one in twenty */
+    for (int i = 0; i < AUTO_OBSERVATIONS; i++)
+        auto_observe(&seen, 10, 10);
+    CHECK_NEAR(auto_correction(&seen), 1, 1e-6); /* the old ones are forgotten */
+    auto_observe(&seen, 0, 10);                  /* nothing was expected: nothing is learnt */
+    CHECK(seen.count == 40 + 3 + AUTO_OBSERVATIONS);
+}
+
+static void check_empty(void)
+{
+    struct auto_table nothing = {.pixels = 1};
+    struct auto_wish wish = {0.02f, 0};
+    struct auto_pick pick;
+    CHECK(!auto_choose(&nothing, &wish, 1, &pick));
+    nothing.count = 1;
+    nothing.rows[0] = (struct auto_row){"hard", .rmse = NAN, .fixed_ms = 1, .screen_ms = 1};
+    CHECK(!auto_choose(&nothing, &wish, 1, &pick));
+}
+
+static void check_candidates(void)
+{
+    static const struct pen_technique_info *const traced_items[] = {
+        &hard, &pcss, &multisample, &raytraced};
+    static const struct pen_catalogue traced = {traced_items, 4}, untraced = {traced_items, 3};
+    const struct pen_catalogue *with_auto = auto_catalogue(&traced);
+    char key[AUTO_KEY_BYTES];
+    uint32_t many_maps = 0, known = 0;
+    CHECK(with_auto->count == 5);
+    CHECK(pen_catalogue_find(with_auto, AUTO_NAME) == with_auto->items[4]);
+    CHECK(auto_candidate_count <= AUTO_MAX_ROWS);
+    for (uint32_t i = 0; i < auto_candidate_count; i++) {
+        const struct auto_candidate *c = &auto_candidates[i];
+        auto_key(c, key);
+        CHECK(auto_find(key) == c); /* keys are distinct */
+        bool maps = !strcmp(c->technique, "multisample"), rays = !strcmp(c->technique, "raytraced");
+        bool is_known =
+            maps || rays || !strcmp(c->technique, "hard") || !strcmp(c->technique, "pcss");
+        many_maps += maps;
+        known += is_known;
+        CHECK(auto_is_candidate(c, &traced, false, false) == is_known);
+        CHECK(auto_is_candidate(c, &traced, true, false) == (maps || rays));
+        CHECK(auto_is_candidate(c, &traced, true, true) == rays);
+        CHECK(auto_is_candidate(c, &untraced, true, true) == maps);
+    }
+    CHECK(many_maps > 0 && known > many_maps);
+    CHECK(auto_find("pcss filter_taps=1000000") == NULL);
+    struct pen_request request = {0};
+    auto_apply(auto_find("multisample samples=64"), &traced, &request);
+    CHECK_STR(request.technique, "multisample");
+    CHECK(request.technique_params[0] == 64);
+    auto_apply(auto_find("hard"), &traced, &request);
+    CHECK(request.technique_params[0] == 0);
+}
+
+/* The store keeps tables per view, device and build. */
+static void check_store(const char *folder)
+{
+    struct pen_error error = {0};
+    struct store_staging staging;
+    struct scene_store *store = scene_store_open(folder, &error);
+    CHECK(store != NULL);
+    if (!store)
+        return;
+    uint8_t scene[PEN_ID_BYTES] = {1};
+    struct pen_device_info device = {.renderer = "one"}, other = {.renderer = "two"};
+    struct auto_table mine = table, got;
+    mine.setup[0] = 7;
+    CHECK(!calibration_load(store, scene, &device, mine.setup, true, &got));
+    CHECK(!calibration_save(store, scene, &device, &mine)); /* no such scene */
+    bool added = false;
+    CHECK(scene_store_stage(store, &staging, &error));
+    const char *names[] = {STORE_SOURCE, STORE_META, scene_store_blob_name(STORE_SCENES)};
+    for (int i = 0; i < 3; i++) {
+        char path[512];
+        snprintf(path, sizeof path, "%s/tmp/%s/%s", folder, staging.name, names[i]);
+        FILE *file = fopen(path, "w");
+        CHECK(file && fputs("x", file) >= 0 && !fclose(file));
+    }
+    CHECK(scene_store_commit(store, STORE_SCENES, &staging, scene, &added, &error) && added);
+    CHECK(calibration_save(store, scene, &device, &mine));
+    CHECK(calibration_load(store, scene, &device, mine.setup, false, &got));
+    CHECK(got.count == mine.count && got.pixels == mine.pixels);
+    for (uint32_t i = 0; i < got.count; i++) {
+        CHECK_STR(got.rows[i].key, mine.rows[i].key);
+        CHECK_NEAR(got.rows[i].rmse, mine.rows[i].rmse, 1e-7);
+        CHECK_NEAR(got.rows[i].screen_ms, mine.rows[i].screen_ms, 1e-5);
+    }
+    CHECK(!calibration_load(store, scene, &other, mine.setup, true, &got));
+    /* Other views push the oldest out. */
+    for (uint8_t i = 0; i < CALIBRATION_TABLES; i++) {
+        mine.setup[0] = (uint8_t)(8 + i);
+        CHECK(calibration_save(store, scene, &device, &mine));
+    }
+    mine.setup[0] = 7;
+    CHECK(!calibration_load(store, scene, &device, mine.setup, false, &got));
+    CHECK(calibration_load(store, scene, &device, mine.setup, true, &got));
+    CHECK(got.setup[0] == 7 + CALIBRATION_TABLES);
+    CHECK(scene_store_remove(store, STORE_SCENES, scene, &error));
+    CHECK(!calibration_load(store, scene, &device, mine.setup, true, &got));
+    scene_store_close(store);
+}
+
+static void check_setup(void)
+{
+    struct pen_request a = {.width = 800, .height = 600, .antialias = 1}, b = a;
+    uint8_t of_a[PEN_ID_BYTES], of_b[PEN_ID_BYTES];
+    calibration_setup(&a, of_a);
+    b.width = 400, b.height = 300, b.exposure_ev = 2;
+    memcpy(b.technique, "pcss", 4);
+    b.technique_params[3] = 9;
+    b.delivery.deadline_ms = 5;
+    calibration_setup(&b, of_b);
+    CHECK(!memcmp(of_a, of_b, sizeof of_a));
+    b.camera.eye[0] = 1;
+    calibration_setup(&b, of_b);
+    CHECK(memcmp(of_a, of_b, sizeof of_a));
+    b = a;
+    b.lights[0].width = 2;
+    calibration_setup(&b, of_b);
+    CHECK(memcmp(of_a, of_b, sizeof of_a));
+    b = a;
+    b.height = 300;
+    calibration_setup(&b, of_b);
+    CHECK(memcmp(of_a, of_b, sizeof of_a));
+}
+
+int main(void)
+{
+    char folder[] = "/tmp/penumbra-auto-XXXXXX";
+    check_prediction();
+    check_error();
+    check_budget();
+    check_both();
+    check_observations();
+    check_empty();
+    check_candidates();
+    check_setup();
+    if (mkdtemp(folder)) {
+        char command[64];
+        check_store(folder);
+        snprintf(command, sizeof command, "rm -r %s", folder);
+        CHECK(!system(command));
+    }
+    CHECK_DONE();
+}

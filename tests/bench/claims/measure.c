@@ -13,7 +13,7 @@
 #include <time.h>
 
 #define MAX_ROUNDS 64
-#define SLOW_SHARE 15 /* a variant whose image takes this part of the group's time is slow */
+#define SLOW_SHARE 6 /* a variant whose image takes this part of the group's time is slow */
 
 struct timing {
     uint32_t rounds;
@@ -113,6 +113,14 @@ static bool time_one(struct plan_variant *variant, const struct pen_result *firs
     return true;
 }
 
+static double frame_seconds(const struct pen_result *result)
+{
+    double ms = 0;
+    for (uint32_t p = 0; p < result->pass_count; p++)
+        ms += (double)result->passes[p].ms;
+    return ms / 1000;
+}
+
 /* Interleaved rounds over all variants that work, after one round of warming up. Slow ones take
  * part in a single round, cold: to them warming up matters little. `kept`, when not NULL: of the
  * same image right after, for which shadow inputs need not be made again. */
@@ -128,7 +136,7 @@ static void time_group(struct plan_group *group, const struct picture *pictures,
         for (uint32_t i = 0; i < group->variant_count; i++) {
             struct plan_variant *variant = &group->variants[i];
             if (variant->status != VARIANT_OK || !strcmp(variant->name, "reference") ||
-                (pictures[i].seconds > slow && round != 1))
+                (frame_seconds(&pictures[i].result) > slow && round != 1))
                 continue;
             const struct pen_result *first = &pictures[i].result;
             if (time_one(variant, first, ++turn, round ? &moving[i] : NULL) && kept)

@@ -313,6 +313,10 @@ bool frame_render(const struct frame_job *job, struct pen_frame *frame, struct p
     if (!view_resolve(&f.view, &r->camera, job->scene, r->width, r->height, error))
         return false;
     f.light_count = lights_resolve(f.lights, r, job->scene, result);
+    uint32_t faces = 1;
+    for (uint32_t i = 0; i < f.light_count; i++)
+        faces += f.lights[i].face_count;
+    job->ctx->shadow_budget = job->ctx->shadow_memory / (faces > 1 ? faces - 1 : 1);
     if (!resolve_emissions(&f, error))
         return false;
     fit_targets(&f);

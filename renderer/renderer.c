@@ -63,7 +63,7 @@ struct pen_renderer *pen_renderer_create(
         return NULL;
     }
     r->budget = config->gpu_memory_bytes ? config->gpu_memory_bytes : 1ull << 30;
-    r->ctx.shadow_budget = r->budget / 2;
+    r->ctx.shadow_memory = r->budget / 2;
     r->ctx.programs = gl_programs_create();
     r->ctx.shadows = shadow_cache_create();
     r->emissions = emission_cache_create();
@@ -158,6 +158,8 @@ static void remove_scene(struct pen_renderer *r, uint32_t i)
 /* Frees least recently used scenes, never `keep`, until the budget holds. */
 static void evict(struct pen_renderer *r, const struct scene *keep)
 {
+    /* Called between frames: what the last one used may go too. */
+    shadow_cache_begin_frame(r->ctx.shadows);
     for (;;) {
         uint64_t scenes = scene_bytes(r), least = UINT64_MAX;
         /* Shadow inputs are cheaper to make again than scenes are to upload. */

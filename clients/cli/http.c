@@ -84,6 +84,7 @@ static size_t on_header(char *line, size_t one, size_t bytes, void *user)
         free(answer->warnings);
         answer->warnings = longer;
     }
+    header_value(line, bytes, "X-Penumbra-Choice", answer->choice, sizeof answer->choice);
     header_value(line, bytes, "Content-Type", answer->type, sizeof answer->type);
     header_value(line, bytes, "Location", answer->location, sizeof answer->location);
     header_value(line, bytes, "Server-Timing", answer->timing, sizeof answer->timing);

@@ -29,6 +29,7 @@ struct cli_answer {
     char type[96];        /* Content-Type */
     char location[512];   /* Location */
     char timing[512];     /* Server-Timing */
+    char choice[320];     /* X-Penumbra-Choice: what "auto" took and why */
     char *warnings;       /* X-Penumbra-Warning, one a line; or NULL */
     double retry_after_s; /* negative: not said */
 };

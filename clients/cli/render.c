@@ -148,6 +148,8 @@ int cli_save_image(const struct cli_server *server, struct cli_call *call, const
     for (char *at = answer.warnings, *line; status == CLI_OK && (line = strsep(&at, "\n"));)
         if (*line)
             fprintf(stderr, "warning: %s\n", line);
+    if (status == CLI_OK && answer.choice[0])
+        fprintf(stderr, "chosen: %s\n", answer.choice);
     if (status == CLI_OK && server->verbose)
         fprintf(stderr, "%s: %zu bytes; %s\n", path, answer.bytes, answer.timing);
     cli_answer_finish(&answer);

@@ -1,6 +1,7 @@
-/* Any bytes as a request body, or (first byte 'q') as lines "key=value" of a query. What is
- * accepted must print to a body that reads back as the same request; what is refused must say why.
- */
+/* Any bytes as a request body, or (first byte 'q') as lines "key=value" of a query, or (first byte
+ * 'c') as the body of a comparison. What is accepted must print to a body that reads back as the
+ * same request; what is refused must say why. */
+#include "protocol/json_compare.h"
 #include "protocol/json_request.h"
 #include "protocol/json_result.h"
 #include "protocol/json_scan.h"
@@ -31,6 +32,16 @@ static bool read_query(char *text, struct pen_request *request, struct pen_error
     return pen_request_from_query(pairs, count, &fake_catalogue, request, error);
 }
 
+static void check_compare(const char *text, size_t bytes)
+{
+    static struct pen_compare compare;
+    struct pen_error error = {0};
+    bool ok = pen_compare_from_json(text, bytes, &fake_catalogue, "none", &compare, &error);
+    REQUIRE(ok == (error.code == PEN_OK));
+    REQUIRE(!ok || (compare.count >= 1 && compare.count <= PEN_COMPARE_METHODS));
+    REQUIRE(ok || (error.code >= 400 && error.code < 500 && error.message[0]));
+}
+
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
@@ -38,6 +49,10 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     struct pen_request request, back;
     struct pen_error error = {0};
     bool ok;
+    if (size && data[0] == 'c') {
+        check_compare((const char *)data + 1, size - 1);
+        return 0;
+    }
     if (size && data[0] == 'q') {
         char *text = malloc(size);
         memcpy(text, data + 1, size - 1);

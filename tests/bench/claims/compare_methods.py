@@ -124,7 +124,7 @@ def add_arguments(parser):
     parser.add_argument("--device", default="auto")
     parser.add_argument("--imported", help="folder for imported scenes; default in the build folder")
     parser.add_argument("--quick", action="store_true", help="smaller pictures, fewer rounds")
-    parser.add_argument("--seconds", type=float, help="time for the rounds of one scene")
+    parser.add_argument("--seconds", type=float, help="time for the rounds of one group")
     parser.add_argument("--repetitions", type=int, help="timed rounds; 0: errors only")
     parser.add_argument("--tiny", action="store_true", help="only shows that everything runs")
 

@@ -103,7 +103,7 @@ static bool time_one(struct plan_variant *variant, const struct pen_result *firs
     request.light_count = first->completed.light_count;
     memcpy(request.lights, first->completed.lights, sizeof request.lights);
     for (uint32_t i = 0; i < request.light_count; i++) {
-        request.lights[i].position[1] += 4e-6f * (float)(turn % 1000);
+        request.lights[i].position[1] *= 1 + 3e-7f * (float)(turn % 1000);
         /* The automatic light of a scene in millimetres is stronger than a request may ask for. */
         request.lights[i].power_w = fminf(request.lights[i].power_w, 1e9f);
     }

@@ -3,7 +3,7 @@
  *
  * Times are comparable within a group only: its variants take turns, so that whatever else the
  * machine does falls on all of them, and the reader takes ratios within one round. Every timed
- * image has its light elsewhere by micrometres, so that shadow inputs are made anew as for a moving
+ * image has its light elsewhere by a hair, so that shadow inputs are made anew as for a moving
  * light or scene. */
 #include "tests/bench/claims/compare.h"
 #include "tests/bench/claims/plan.h"
@@ -103,7 +103,8 @@ static bool time_one(struct plan_variant *variant, const struct pen_result *firs
     request.light_count = first->completed.light_count;
     memcpy(request.lights, first->completed.lights, sizeof request.lights);
     for (uint32_t i = 0; i < request.light_count; i++) {
-        request.lights[i].position[1] *= 1 + 3e-7f * (float)(turn % 1000);
+        for (int k = 0; k < 3; k++)
+            request.lights[i].position[k] *= 1 + 3e-7f * (float)(turn % 1000);
         /* The automatic light of a scene in millimetres is stronger than a request may ask for. */
         request.lights[i].power_w = fminf(request.lights[i].power_w, 1e9f);
     }

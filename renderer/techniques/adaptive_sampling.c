@@ -28,7 +28,7 @@ static const struct pen_param rows[] = {
         .help = "How often the light is split at most: 4, 9, 25, 81 or 289 samples."),
     PARAM(struct adaptive_sampling, min_level, .def = 1, .min = 0, .max = LIGHT_TREE_LEVELS,
         .help = "How often it is split wherever something may cast, against thin casters."),
-    PARAM(struct adaptive_sampling, threshold, .def = 0.1, .min = 0, .max = 100, .unit = "%",
+    PARAM(struct adaptive_sampling, threshold, .def = 0.05, .min = 0, .max = 100, .unit = "%",
         .help = "Share of the picture's pixels that must see a difference for a split."),
     PARAM(struct adaptive_sampling, kernel, .def = 2, .min = 1, .max = 5,
         .help = "Texels along each side of the filter, which bridges close samples; 1: none."),

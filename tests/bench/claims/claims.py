@@ -65,6 +65,7 @@ def measure(args, mode):
         bench.import_scenes(args.build, folder)
     plan = bench.Plan(folder)
     scale = Scale(mode)
+    scale.seconds = args.seconds or scale.seconds
     for name, experiment in EXPERIMENTS.items():
         if not args.papers or name in args.papers.split(","):
             experiment(plan, scale)

@@ -37,7 +37,7 @@ def plan_methods(plan, scenes, techniques, size, samples, repetitions, seconds, 
         # The bunny has the light of its published timings, the others the automatic one.
         light = "&" + scenes_module.light(scene) if scene.startswith("bunny") else ""
         plan.group("methods-" + scene.replace("@", "-"), scene, variants,
-                   "width=%d&height=%d%s" % (width, height, light), repetitions, seconds, "fkp" if repetitions > 1 else "fp")
+                   "width=%d&height=%d%s" % (width, height, light), repetitions, seconds, "fp" if repetitions == 1 else "fkp")
 
 
 def table_rows(group):
@@ -124,7 +124,8 @@ def add_arguments(parser):
     parser.add_argument("--device", default="auto")
     parser.add_argument("--imported", help="folder for imported scenes; default in the build folder")
     parser.add_argument("--quick", action="store_true", help="smaller pictures, fewer rounds")
-    parser.add_argument("--seconds", type=float, help="time for the rounds of one scene")
+    parser.add_argument("--seconds", type=float, help="time for the rounds of one group")
+    parser.add_argument("--repetitions", type=int, help="timed rounds; 0: errors only")
     parser.add_argument("--tiny", action="store_true", help="only shows that everything runs")
 
 
@@ -142,6 +143,7 @@ def run(args):
     plan = bench.Plan(folder)
     size, samples, repetitions, seconds = settings(args)
     seconds = args.seconds or seconds
+    repetitions = repetitions if args.repetitions is None else args.repetitions
     plan_methods(plan, scenes, names, size, samples, repetitions, seconds, ladders=not args.tiny)
     device, groups = plan.run(args.build, args.out, args.device, "methods.jsonl")
     write_tables(args.out, device, list(groups.values()))

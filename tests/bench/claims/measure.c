@@ -3,11 +3,12 @@
  *
  * Times are comparable within a group only: its variants take turns, so that whatever else the
  * machine does falls on all of them, and the reader takes ratios within one round. Every timed
- * image has its light elsewhere by micrometres, so that shadow inputs are made anew as for a moving
+ * image has its light elsewhere by a hair, so that shadow inputs are made anew as for a moving
  * light or scene. */
 #include "tests/bench/claims/compare.h"
 #include "tests/bench/claims/plan.h"
 #include <getopt.h>
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
@@ -101,8 +102,12 @@ static bool time_one(struct plan_variant *variant, const struct pen_result *firs
     request.lights_given = 1;
     request.light_count = first->completed.light_count;
     memcpy(request.lights, first->completed.lights, sizeof request.lights);
-    for (uint32_t i = 0; i < request.light_count; i++)
-        request.lights[i].position[1] += 4e-6f * (float)(turn % 1000);
+    for (uint32_t i = 0; i < request.light_count; i++) {
+        for (int k = 0; k < 3; k++)
+            request.lights[i].position[k] *= 1 + 3e-7f * (float)(turn % 1000);
+        /* The automatic light of a scene in millimetres is stronger than a request may ask for. */
+        request.lights[i].power_w = fminf(request.lights[i].power_w, 1e9f);
+    }
     if (!pen_renderer_render(renderer, &request, &frame, &result, &variant->error)) {
         variant->status = VARIANT_FAILED;
         return false;

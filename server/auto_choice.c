@@ -1,10 +1,12 @@
 #include "server/auto_choice.h"
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #define RMSE_MARGIN 1.25 /* another resolution and other pixels than those that were measured */
 #define TIME_MARGIN 1.25
+#define FEW_OBSERVATIONS 8
 #define DEFAULT_RMSE 0.02f
 #define MAX_METHODS 63
 
@@ -107,6 +109,29 @@ double auto_predict(const struct auto_table *table, const struct auto_row *row, 
 {
     double ratio = (double)pixels / (table->pixels ? table->pixels : 1);
     return row->fixed_ms + row->screen_ms * (ratio < 1 ? 0.5 * (1 + ratio) : ratio);
+}
+
+void auto_observe(struct auto_observed *observed, double expected_ms, double ms)
+{
+    if (expected_ms > 0 && ms > 0)
+        observed->ratios[observed->count++ % AUTO_OBSERVATIONS] = (float)(ms / expected_ms);
+}
+
+static int compare_floats(const void *a, const void *b)
+{
+    float x = *(const float *)a, y = *(const float *)b;
+    return (x > y) - (x < y);
+}
+
+double auto_correction(const struct auto_observed *observed)
+{
+    struct auto_observed sorted = *observed;
+    uint32_t count = sorted.count < AUTO_OBSERVATIONS ? sorted.count : AUTO_OBSERVATIONS;
+    if (!count)
+        return 1;
+    qsort(sorted.ratios, count, sizeof *sorted.ratios, compare_floats);
+    double high = sorted.ratios[(uint32_t)ceil(0.95 * count) - 1];
+    return count < FEW_OBSERVATIONS ? fmax(high, 1) : high;
 }
 
 static void explain(const struct auto_wish *wish, struct auto_pick *pick)

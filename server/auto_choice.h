@@ -64,6 +64,16 @@ struct auto_pick {
  * measured are credited with half of what they should save. */
 double auto_predict(const struct auto_table *table, const struct auto_row *row, uint64_t pixels);
 
+/* What renders took by the side of what was expected: the factor that 19 of 20 of them stay below.
+ * Fewer than eight can only make an expectation worse. */
+#define AUTO_OBSERVATIONS 40
+struct auto_observed {
+    uint32_t count; /* ever; the last AUTO_OBSERVATIONS are kept */
+    float ratios[AUTO_OBSERVATIONS];
+};
+void auto_observe(struct auto_observed *observed, double expected_ms, double ms);
+double auto_correction(const struct auto_observed *observed);
+
 /* max_rmse: the cheapest row that stays below it with a quarter to spare. budget_ms: the most
  * accurate row whose expected time leaves a fifth of the budget free. Both: the cheapest that does
  * both. Nothing does: the most accurate row within the budget, else the fastest; without a budget

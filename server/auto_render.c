@@ -2,6 +2,7 @@
 #include "server/calibration.h"
 #include "server/clock.h"
 #include "server/compare.h"
+#include "server/hash.h"
 #include "server/log.h"
 #include "server/routes.h"
 #include <math.h>
@@ -16,7 +17,9 @@
 #define REPEATS 5
 #define SLOW_MS 400 /* a candidate that takes longer is timed once */
 #define PATIENCE_MS 120000
-#define MAX_RUNS 4 /* at the same time */
+#define HISTORIES 64
+#define FORGET_NS (600 * CLOCK_S) /* a busy hour must not be held against a row for ever */
+#define MAX_RUNS 4                /* at the same time */
 #define MAX_STEPS (1 + AUTO_MAX_ROWS * (1 + REPEATS))
 
 /* One scene and view being measured, and the calls that wait for it. */
@@ -32,9 +35,17 @@ struct run {
     uint32_t measures[MAX_STEPS];
 };
 
+/* How long a row's renders took lately. */
+struct history {
+    uint8_t key[PEN_ID_BYTES]; /* of view and row */
+    uint64_t last_ns;          /* 0: free */
+    struct auto_observed observed;
+};
+
 struct auto_runs {
-    pthread_mutex_t lock; /* guards first and every run's calls */
+    pthread_mutex_t lock; /* guards what follows, and every run's calls */
     struct run *first;
+    struct history histories[HISTORIES];
 };
 
 struct auto_runs *auto_runs_create(void)
@@ -56,9 +67,71 @@ void auto_runs_destroy(struct auto_runs *runs)
 
 /* ---- choosing ---- */
 
-/* Takes a method from the table and serves the call. */
-static void serve(struct call *call, const struct auto_table *table)
+static void history_key(const struct auto_table *table, const struct auto_row *row,
+    const struct call *call, uint8_t key[PEN_ID_BYTES])
 {
+    struct hash *hash = hash_create();
+    const uint32_t size[2] = {call->request.width, call->request.height};
+    hash_add(hash, table->setup, sizeof table->setup);
+    hash_add(hash, row->key, strlen(row->key));
+    hash_add(hash, size, sizeof size);
+    hash_finish(hash, key);
+}
+
+static struct history *find_history(struct auto_runs *runs, const uint8_t key[PEN_ID_BYTES])
+{
+    for (int i = 0; i < HISTORIES; i++) {
+        struct history *h = &runs->histories[i];
+        if (h->last_ns && !memcmp(h->key, key, PEN_ID_BYTES))
+            return clock_now_ns() - h->last_ns < FORGET_NS ? h : NULL;
+    }
+    return NULL;
+}
+
+void auto_runs_observe(struct auto_runs *runs, const struct call *call, double ms)
+{
+    pthread_mutex_lock(&runs->lock);
+    struct history *h = find_history(runs, call->choice_key);
+    if (!h) { /* its own that is out of date, a free one, or the oldest */
+        h = &runs->histories[0];
+        for (int i = 0; i < HISTORIES; i++) {
+            struct history *other = &runs->histories[i];
+            bool own = !memcmp(other->key, call->choice_key, PEN_ID_BYTES);
+            if (own || other->last_ns < h->last_ns)
+                h = other;
+            if (own)
+                break;
+        }
+        memset(h, 0, sizeof *h);
+        memcpy(h->key, call->choice_key, PEN_ID_BYTES);
+    }
+    h->last_ns = clock_now_ns();
+    auto_observe(&h->observed, call->choice_ms, ms);
+    pthread_mutex_unlock(&runs->lock);
+}
+
+/* The table's times as renders of this size have borne them out; `factors` says how. */
+static void correct(struct call *call, struct auto_table *table, double factors[AUTO_MAX_ROWS])
+{
+    struct auto_runs *runs = call->service->auto_runs;
+    for (uint32_t i = 0; i < table->count; i++) {
+        uint8_t key[PEN_ID_BYTES];
+        history_key(table, &table->rows[i], call, key);
+        pthread_mutex_lock(&runs->lock);
+        const struct history *h = find_history(runs, key);
+        factors[i] = h ? auto_correction(&h->observed) : 1;
+        pthread_mutex_unlock(&runs->lock);
+        table->rows[i].fixed_ms *= factors[i];
+        table->rows[i].screen_ms *= factors[i];
+    }
+}
+
+/* Takes a method from the table and serves the call. */
+static void serve(struct call *call, const struct auto_table *measured)
+{
+    struct auto_table corrected = *measured, *table = &corrected;
+    double factors[AUTO_MAX_ROWS];
+    correct(call, table, factors);
     struct auto_wish wish;
     struct auto_pick pick;
     struct pen_error error = {0};
@@ -72,6 +145,8 @@ static void serve(struct call *call, const struct auto_table *table)
     auto_apply(auto_find(pick.row->key), call->service->catalogue, &call->request);
     snprintf(call->choice, sizeof call->choice, "%s", pick.why);
     call->choice_met = pick.met;
+    call->choice_ms = pick.predicted_ms / factors[pick.row - table->rows];
+    history_key(table, pick.row, call, call->choice_key);
     routes_serve(call);
 }
 

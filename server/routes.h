@@ -31,6 +31,8 @@ struct call {
     struct pen_compare *compare;
     struct call *next_waiting; /* for a calibration */
     char choice[256];          /* why this method was taken */
+    uint8_t choice_key[PEN_ID_BYTES];
+    double choice_ms; /* expected */
     bool choice_met, is_deferred;
     /* For the log: */
     const char *technique;

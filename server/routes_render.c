@@ -78,6 +78,8 @@ static void finish(struct waiter *waiter, const struct outcome *outcome)
 {
     struct call *call = (struct call *)((char *)waiter - offsetof(struct call, waiter));
     call->queue_ms = outcome->queue_ms;
+    if (*call->choice && outcome->error.code == PEN_OK)
+        auto_runs_observe(call->service->auto_runs, call, outcome->run_ms);
     if (outcome->error.code != PEN_OK)
         routes_fail(call, &outcome->error, outcome->retry_after_s);
     else

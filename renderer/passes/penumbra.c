@@ -86,9 +86,10 @@ static GLuint make_target(struct technique_run *run, bool next)
 static bool filter(struct technique_run *run, const struct step *step, struct pen_error *error)
 {
     struct technique_ctx *ctx = run->ctx;
-    char defines[160];
+    char defines[256];
     bool hard = step->source == PENUMBRA_HARD;
-    snprintf(defines, sizeof defines, "%s%s%s%s", step->defines, step->last ? "#define LAST\n" : "",
+    snprintf(defines, sizeof defines, "#define LIGHT_SHAPE %d\n#define LIGHT_PARALLEL %d\n%s%s%s%s",
+        run->face->shape, run->face->parallel, step->defines, step->last ? "#define LAST\n" : "",
         hard ? "#define FROM_HARD\n" : "", is_textured(run) ? "#define TEXTURED\n" : "");
     GLuint framebuffer = 0;
     if (!step->last) {

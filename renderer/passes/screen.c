@@ -57,7 +57,12 @@ void pass_draw_tiles(struct technique_ctx *ctx, GLuint program, GLuint framebuff
     gl.BindTextureUnit(UNIT_TILES, tiles->name);
     gl.ProgramUniform2i(program, gl.GetUniformLocation(program, "tile"), CLASSIFY_TILE, tile_class);
     begin(ctx, program, framebuffer, width, height, add);
-    gl.DrawArraysInstanced(GL_TRIANGLE_STRIP, 0, 4, (GLsizei)(tiles->width * tiles->height));
+    /* Whole tiles: a point whose centre is outside the viewport would be lost. */
+    gl.Viewport(
+        0, 0, (GLsizei)tiles->width * CLASSIFY_TILE, (GLsizei)tiles->height * CLASSIFY_TILE);
+    gl.Enable(GL_PROGRAM_POINT_SIZE);
+    gl.DrawArrays(GL_POINTS, 0, (GLsizei)(tiles->width * tiles->height));
+    gl.Disable(GL_PROGRAM_POINT_SIZE);
     gl.Disable(GL_BLEND);
 }
 

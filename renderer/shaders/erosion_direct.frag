@@ -14,7 +14,7 @@ void main()
     float v = hard.x;
     if (to.x != FAR) {
         float t = edge_distance(texelFetch(lines, pixel + ivec2(to), 0), to,
-            texelFetch(axes_map, pixel, 0), hard.x > 0.5);
+            texelFetch(axes_map, pixel, 0), plane_at(pixel), hard.x > 0.5);
         t = clamp(t, -1.0, 1.0);
         // A straight edge across a rectangle gives a linear ramp, across a disk its chord's area.
         v = light.shape == SHAPE_DISK ? 0.5 + (t * sqrt(1.0 - t * t) + asin(t)) / 3.14159265

@@ -1,7 +1,6 @@
 // One step of jump flooding (Rong and Tan 2006): each pixel keeps the offset of the edge that is
 // nearest in half penumbra widths, among those on its own plane. FIRST: every edge is its own seed.
 #include "erosion_line.glsl"
-#include "surface_plane.glsl"
 layout(binding = 10) uniform sampler2D seeds;
 layout(std140, binding = 3) uniform StepBlock {
     ivec4 step;
@@ -31,7 +30,7 @@ void main()
         to += vec2(jump);
 #endif
         ivec2 edge = pixel + ivec2(to);
-        float d = abs(edge_distance(texelFetch(lines, edge, 0), to, axes, hard.x > 0.5));
+        float d = abs(edge_distance(texelFetch(lines, edge, 0), to, axes, plane, hard.x > 0.5));
         if (d < best && abs(plane_distance(plane, edge, ivec2(to))) < 2.0) {
             best = d;
             seed = to;

@@ -1,6 +1,7 @@
 // The distance of a pixel from a fitted edge, in half penumbra widths.
 #include "view.glsl"
 #include "light.glsl"
+#include "surface_plane.glsl"
 layout(binding = 7) uniform sampler2D hard_map;
 layout(binding = 8) uniform sampler2D axes_map;
 layout(binding = 9) uniform sampler2D lines;
@@ -9,16 +10,18 @@ const float FAR = 1e4; // no edge
 
 // Positive on the lit side. `to`: offset of the edge pixel; `line`: from erosion_lines.frag. Past the
 // end of an edge (a corner) the distance grows along it too.
-float edge_distance(vec4 line, vec2 to, vec4 axes, bool lit)
+float edge_distance(vec4 line, vec2 to, vec4 axes, Plane plane, bool lit)
 {
     if (line.w == 0.0)
         return FAR;
     float across = -dot(line.xy, to) - line.z;
     float along = max(abs(dot(vec2(-line.y, line.x), to)) - 2.0, 0.0);
-    // Half width of the light's image across the line (the penumbra's half width, F5).
+    // Half width of the light's image across the line (the penumbra's half width, F5), at this pixel;
+    // towards the camera a pixel is less of the receiver, away from it more.
     vec2 reach = vec2(dot(axes.xy, line.xy), dot(axes.zw, line.xy));
     float half_width =
         line.w * (light.shape == SHAPE_DISK ? length(reach) : abs(reach.x) + abs(reach.y));
+    half_width *= clamp(1.0 - across * dot(plane.gradient, line.xy) / plane.depth, 0.25, 4.0);
     // Next to the edge the line decides which side this is, so that the stairs of the hard shadow do
     // not show; farther off, and past the edge's end, the hard shadow does.
     bool outside = abs(across) < 1.5 && along == 0.0 ? across >= 0.0 : lit;

@@ -38,7 +38,7 @@ void main()
             vec3 f = vec3(0.0), s = vec3(0.0);
             add_pixel(edge, offset, exp(falloff * dot(offset, offset)), f, s, side);
             // The far side of a thin shadow and edges of other casters are other lines.
-            bool same = dot(side, own_side) >= 0.0 && abs(edge.y - own.y) < 0.25 * own.y &&
+            bool same = dot(side, own_side) > 0.0 && abs(edge.y - own.y) < 0.25 * own.y &&
                 at != pixel;
             first += same ? f : vec3(0.0);
             second += same ? s : vec3(0.0);

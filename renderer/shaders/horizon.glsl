@@ -19,7 +19,8 @@ float horizon_share(vec3 p, vec3 n)
     // Share of a square above a line: with a >= b >= 0 the trapezoid's integral over one axis of the
     // clamped linear ramp along the other, (F(c + b) - F(c - b)) / (4 a b), F the ramp's integral.
     float a = max(abs(g.x), abs(g.y)), b = max(min(abs(g.x), abs(g.y)), 1e-4 * a);
-    if (a < 1e-12)
+    // All above or all below; the difference of integrals would cancel to nothing there.
+    if (abs(c) >= a + b)
         return c > 0.0 ? 1.0 : 0.0;
     vec2 t = clamp(vec2(c + b, c - b), -a, a);
     // F(x) = integral from -a of clamp(x + a, 0, 2a): quadratic inside, linear beyond.

@@ -36,9 +36,3 @@ vec3 screen_spread(mat2 pixels, vec2 sigma, float most)
     return vec3(sqrt(max(xx - skew * xy, 0.0) * shrink), skew, sqrt(yy * shrink));
 }
 
-// Deviation of the Gaussian that stands for the light, per half extent: a uniform segment and a
-// uniform disk seen from the side, matched between 10 and 90 %.
-float light_deviation()
-{
-    return light.shape == SHAPE_DISK ? 0.536 : 0.624;
-}

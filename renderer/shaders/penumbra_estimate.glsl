@@ -2,6 +2,7 @@
 // s2; see screen_spread). What is proved to be lit is left as the target starts: (1, 0, 0, 0).
 #include "penumbra.glsl"
 #include "blockers.glsl"
+#include "light_gauss.glsl"
 
 vec4 visibility(Surface s)
 {
@@ -15,7 +16,7 @@ vec4 visibility(Surface s)
     vec2 extent = blocker_extent(s, plane, search, light_uv(q), least, bias);
     bool lit = hard_lit(s, plane, q, texel, bias, depth);
     vec3 spread = screen_spread(
-        pixels_per_map(s), light_deviation() * extent, 0.4 * float(P(max_radius)));
+        pixels_per_map(s), light_gauss_deviation * extent, light_gauss_deviation * float(P(max_radius)));
     // All zeros are left to receivers that no part of the light can reach.
     return vec4(lit ? 1.0 : 0.0, spread.xy, max(spread.z, 1e-3));
 }

@@ -21,7 +21,7 @@ static const struct pen_param rows[] = {
     PENUMBRA_ROWS(struct bilateral, 12),
     PARAM(struct bilateral, filter_taps, .def = 4, .min = 1, .max = 64,
         .help = "Most taps to each side of a pixel, in each of the two passes."),
-    PARAM(struct bilateral, sigma, .def = 0.1, .min = 0, .max = 4,
+    PARAM(struct bilateral, sigma, .def = 0.15, .min = 0, .max = 4,
         .help = "Width of the filter over that of the penumbra."),
     FILTER_ROWS(struct bilateral),
 };

@@ -137,11 +137,13 @@ int receiver_window(Receiver r, vec2 extent)
     return window_class(r.q, extent, r.plane, r.bias, margin, r.map_size);
 }
 
-// The receiver's scaled depth for a cell of the window: that of its plane at the cell's near corner,
-// so that a tilted receiver does not block itself.
+// The receiver's scaled depth for a cell of the window: that of its plane, a little towards the
+// cell's near corner, so that a tilted receiver blocks itself less. The whole way would hide more
+// near blockers than it saves: errors on the bunny and the demo are least at about a quarter.
 float cell_depth(Receiver r, vec2 offset, vec2 extent)
 {
-    float d = r.plane.depth + dot(r.plane.gradient, offset) - dot(abs(r.plane.gradient), extent);
+    float d = r.plane.depth + dot(r.plane.gradient, offset) -
+        0.25 * dot(abs(r.plane.gradient), extent);
     float z = light_linear(clamp(d - r.bias, 0.0, 1.0));
     return (z - light.near_z) / (light.far_z - light.near_z) * series.range;
 }
@@ -203,7 +205,7 @@ float cell_visibility(Receiver r, float f, float depth, vec2 offset, vec2 extent
         float z = (nearest - light.near_z) / (light.far_z - light.near_z) * series.range;
         float x = z - depth + series.offset;
         if (x > -series.offset)
-            low = max(low, min(series_step(x), high - 0.25));
+            low = max(low, min(series_step(x), high - 0.5));
     }
     return clamp((f - low) / (high - low), 0.0, 1.0);
 #endif

@@ -18,7 +18,7 @@ static const struct pen_param rows[] = {
     BIAS_ROW(struct cssm),
     PARAM(struct cssm, search_taps, .def = 2, .min = 1, .max = 8,
         .help = "Lookups per axis of the blocker average."),
-    PARAM(struct cssm, taps, .def = 2, .min = 1, .max = 8,
+    PARAM(struct cssm, taps, .def = 3, .min = 1, .max = 8,
         .help = "Lookups per axis of the filter; 1: a single one, as wide as the penumbra."),
     PARAM(struct cssm, min_filter, .def = 1, .min = 0, .max = 16, .unit = "texel",
         .help = "Least half width of the filter."),

@@ -30,7 +30,7 @@ static const struct pen_param rows[] = {
         .help = "Depth comparisons of the filter; variant pcf."),
     PARAM(struct erosion, min_filter, .def = 1, .min = 0, .max = 16, .unit = "texel",
         .help = "Least half width of the filter; variant pcf."),
-    PARAM(struct erosion, smooth, .def = 1, .specialise = 1,
+    PARAM(struct erosion, smooth, .def = 1,
         .help = "Shifts the taps per pixel and averages 4 x 4 pixels of wide penumbrae; variant "
                 "pcf."),
     PARAM(struct erosion, fit_radius, .def = 4, .min = 1, .max = 8, .unit = "px",
@@ -163,13 +163,16 @@ static bool record_pcf(struct technique_run *run, struct pen_error *error)
         .textures = textures,
         .texture_count = 2,
         .tiles = inputs.tiles};
-    return params->smooth.on ? pass_interleaved(run, &pass, error) : pass_screen(run, &pass, error);
+    /* The average knows nothing of other faces. */
+    bool smooth = params->smooth.on && !run->face->cube;
+    return smooth ? pass_interleaved(run, &pass, error) : pass_screen(run, &pass, error);
 }
 
 static bool fit_lines(struct technique_run *run, struct pen_error *error)
 {
     const struct gl_texture *scratch = run->ctx->scratch;
     const struct gl_texture *edges = pass_scratch(run, SCRATCH_ALL, GL_RG16F, 1);
+    const struct gl_texture *rough = pass_scratch(run, SCRATCH_ALL_NEXT, GL_RGBA16F, 1);
     const struct gl_texture *lines = pass_scratch(run, SCRATCH_LINES, GL_RGBA16F, 1);
     struct fill find = {.name = "edges",
         .fragment = "erosion_edges.frag",
@@ -178,10 +181,15 @@ static bool fit_lines(struct technique_run *run, struct pen_error *error)
         .texture_count = 1};
     struct fill fit = {.name = "line fit",
         .fragment = "erosion_lines.frag",
-        .target = lines,
+        .target = rough,
         .textures = {{UNIT_FREE, edges->name, GL_SAMPLE_NEAREST}},
         .texture_count = 1};
-    return fill(run, &find, error) && fill(run, &fit, error);
+    struct fill smooth = {.name = "line fit",
+        .fragment = "erosion_smooth.frag",
+        .target = lines,
+        .textures = {{UNIT_FREE, rough->name, GL_SAMPLE_NEAREST}},
+        .texture_count = 1};
+    return fill(run, &find, error) && fill(run, &fit, error) && fill(run, &smooth, error);
 }
 
 static bool flood(
@@ -233,11 +241,13 @@ static bool record_direct(struct technique_run *run, struct pen_error *error)
         return false;
     struct fill f = {.name = "erosion",
         .fragment = "erosion_direct.frag",
-        .textures = {{UNIT_FREE, hard->name, GL_SAMPLE_NEAREST},
+        .textures = {{UNIT_DEPTH, run->gbuffer->depth.name, GL_SAMPLE_NEAREST},
+            {UNIT_NORMAL, run->gbuffer->normal.name, GL_SAMPLE_NEAREST},
+            {UNIT_FREE, hard->name, GL_SAMPLE_NEAREST},
             {UNIT_FREE + 1, axes->name, GL_SAMPLE_NEAREST},
             {UNIT_FREE + 2, run->ctx->scratch[SCRATCH_LINES].name, GL_SAMPLE_NEAREST},
             {UNIT_FREE + 3, seeds->name, GL_SAMPLE_NEAREST}},
-        .texture_count = 4};
+        .texture_count = 6};
     return fill(run, &f, error);
 }
 

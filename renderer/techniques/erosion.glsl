@@ -1,6 +1,8 @@
 // Klein et al. 2014, variant pcf: the penumbra grows from the edges of the hard shadow by their own
 // width, found in the edge pyramid, and percentage-closer filtering runs only there.
 #include "taps.glsl"
+#include "dither.glsl"
+#include "erosion_window.glsl"
 layout(binding = 7) uniform sampler2D hard_map;
 layout(binding = 8) uniform sampler2D edge_pyramid; // trilinear
 
@@ -46,10 +48,15 @@ vec4 visibility(Surface s)
     vec2 inverse_size = 1.0 / (light.rect.zw - light.rect.xy), uv = light_uv(q);
     if (w > 0.0)
         w = min(edge_mean(s.pixel, radius), hard.z);
-    vec2 extent = max(light.extent * w, P(min_filter) * texel);
+    vec2 extent = max(window_extent * w, P(min_filter) * texel);
     ReceiverPlane plane = receiver_plane(s.p, s.n);
     float bias = P(bias) * s.p.z * light_depth_slope(s.p.z), lit = 0.0;
-    Taps taps = taps_begin(P(filter_taps), P(smooth) ? frame_shift(s.pixel) : vec2(0.5));
+#ifdef INTERLEAVED
+    vec2 shift = dither2(s.pixel, view.display.z);
+#else
+    vec2 shift = vec2(0.5);
+#endif
+    Taps taps = taps_begin(P(filter_taps), shift);
     for (int i = 0; i < count; i++) {
         vec2 offset = taps_next(taps) * extent;
         float d = texture(shadow_map, uv + offset * inverse_size).r;

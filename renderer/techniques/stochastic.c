@@ -24,7 +24,7 @@ static const struct pen_param rows[] = {
     PENUMBRA_ROWS(struct stochastic, 12),
     PARAM(struct stochastic, levels, .def = 2, .min = 0, .max = 6,
         .help = "Levels of the a-trous filter; each doubles its reach."),
-    PARAM(struct stochastic, blur, .def = 0.5, .min = 0, .max = 4,
+    PARAM(struct stochastic, blur, .def = 0.6, .min = 0, .max = 4,
         .help = "Width of the filter over that of the penumbra."),
     FILTER_ROWS(struct stochastic),
 };

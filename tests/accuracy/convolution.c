@@ -227,7 +227,9 @@ int main(void)
     check_leaks("technique=cssm&storage=tables");
     check_leaks("technique=cssm");
     check_leaks("technique=cssm&terms=8&damping=1&offset=0.5");
-    CHECK(two_plane_width_error("technique=cssm") < 0.05);
+    /* Mips: a kernel of the same variance as the box, which is a little narrower at 10 and 90 %. */
+    CHECK(two_plane_width_error("technique=cssm") < 0.08);
+    CHECK(two_plane_width_error("technique=cssm&storage=tables") < 0.05);
     /* Exact boxes: one lookup is a whole filter. */
     CHECK(two_plane_width_error("technique=cssm&storage=tables&taps=1&search_taps=1") < 0.1);
     CHECK(two_plane_width_error("technique=cssm&terms=8&taps=4") < 0.05);

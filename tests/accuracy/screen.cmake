@@ -1,1 +1,2 @@
 penumbra_accuracy_test(screen)
+target_link_libraries(accuracy_screen PRIVATE penumbra_textured)

@@ -87,6 +87,28 @@ static void check_both(void)
     CHECK(!met);
 }
 
+static void check_observations(void)
+{
+    struct auto_observed seen = {0};
+    CHECK_NEAR(auto_correction(&seen), 1, 0);
+    for (int i = 0; i < 4; i++)
+        auto_observe(&seen, 10, 5);
+    CHECK_NEAR(auto_correction(&seen), 1, 0); /* too few to be trusted with good news */
+    auto_observe(&seen, 10, 20);
+    CHECK_NEAR(auto_correction(&seen), 2, 1e-6);
+    for (int i = 0; i < 35; i++)
+        auto_observe(&seen, 10, 5);
+    CHECK_NEAR(auto_correction(&seen), 0.5, 1e-6); /* one of forty */
+    for (int i = 0; i < 3; i++)
+        auto_observe(&seen, 10, 30);
+    CHECK_NEAR(auto_correction(&seen), 3, 1e-6); /* three of forty are more than one in twenty */
+    for (int i = 0; i < AUTO_OBSERVATIONS; i++)
+        auto_observe(&seen, 10, 10);
+    CHECK_NEAR(auto_correction(&seen), 1, 1e-6); /* the old ones are forgotten */
+    auto_observe(&seen, 0, 10);                  /* nothing was expected: nothing is learnt */
+    CHECK(seen.count == 40 + 3 + AUTO_OBSERVATIONS);
+}
+
 static void check_empty(void)
 {
     struct auto_table nothing = {.pixels = 1};
@@ -212,6 +234,7 @@ int main(void)
     check_error();
     check_budget();
     check_both();
+    check_observations();
     check_empty();
     check_candidates();
     check_setup();

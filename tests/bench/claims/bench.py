@@ -58,9 +58,12 @@ class Plan:
         results = []
         with open(os.path.join(out, log), "w") as file:
             for line in child.stdout:
-                file.write(line)
+                result = json.loads(line)
+                if not results:  # the device; what else the machine did belongs to it
+                    result.update(processors=os.cpu_count(), load=os.getloadavg()[0])
+                results.append(result)
+                file.write(json.dumps(result) + "\n")
                 file.flush()
-                results.append(json.loads(line))
         status = child.wait()
         if status == 77:
             sys.exit(77)

@@ -85,6 +85,10 @@ def main():
     args.scenes = args.techniques = None
     mode = "tiny" if args.tiny else "quick" if args.quick else "full"
     os.makedirs(args.out, exist_ok=True)
+    written = os.path.join(args.out, "claims.json")
+    if args.only == "report" and os.path.exists(written):
+        with open(written) as file:
+            mode = json.load(file)["mode"]
     if args.only in (None, "claims"):
         measure(args, mode)
     if args.only in (None, "methods"):
@@ -92,7 +96,7 @@ def main():
     device, groups = load(args.out, "claims.jsonl")
     methods_device, methods = load(args.out, "methods.jsonl")
     papers = try_papers(groups) if groups else []
-    with open(os.path.join(args.out, "claims.json"), "w") as file:
+    with open(written, "w") as file:
         json.dump({"device": device, "mode": mode, "papers": finite(papers)}, file, indent=1)
     report.write(args.out, device or methods_device, mode, papers, groups, list(methods.values()))
     for paper in papers:

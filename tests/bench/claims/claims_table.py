@@ -50,9 +50,7 @@ def subdivided(name):
     def value(group):
         found = variant(group, name)
         counts = found and found.get("subdivided_pixels")
-        if not counts:
-            return []
-        return [sum(counts) / (group["width"] * group["height"])]
+        return [sum(counts) / (group["width"] * group["height"])] if counts else []
     return value
 
 

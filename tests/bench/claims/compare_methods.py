@@ -73,8 +73,9 @@ def markdown(device, groups):
              "Device: %s, OpenGL %s. Reference: the light ray traced. RMSE: of mean visibility, all "
              "pixels, and where the reference is between 0.02 and 0.98. SSIM and FLIP: of the "
              "finished picture. ms: median of an image, G-buffer to shading, with the shadow inputs "
-             "made anew (moving) and kept; the methods took turns, so compare within a table only."
-             % (device["device"], device["gl"])]
+             "made anew (moving) and kept; the methods took turns, so compare within a table only.%s"
+             % (device["device"], device["gl"], " %d processors, load average %.1f." % (
+                 device["processors"], device["load"]) if "load" in device else "")]
     for group in groups:
         lines += ["", "## %s, %d x %d, %d triangles" % (
             group["scene"], group["width"], group["height"], group["triangles"]), "",

@@ -13,7 +13,7 @@
 #include <time.h>
 
 #define MAX_ROUNDS 64
-#define SLOW_SHARE 15 /* a variant whose image takes this part of the group's time is slow */
+#define SLOW_SHARE 6 /* a variant whose image takes this part of the group's time is slow */
 
 struct timing {
     uint32_t rounds;
@@ -90,7 +90,7 @@ static void store_times(struct timing *timing, const struct pen_result *result)
     }
 }
 
-/* One image for its times. `turn` tells lights apart; 0 leaves them where they are. */
+/* One image for its times. `turn` tells lights apart. */
 static bool time_one(struct plan_variant *variant, const struct pen_result *first, uint32_t turn,
     struct timing *timing)
 {
@@ -101,7 +101,7 @@ static bool time_one(struct plan_variant *variant, const struct pen_result *firs
     request.lights_given = 1;
     request.light_count = first->completed.light_count;
     memcpy(request.lights, first->completed.lights, sizeof request.lights);
-    for (uint32_t i = 0; turn && i < request.light_count; i++)
+    for (uint32_t i = 0; i < request.light_count; i++)
         request.lights[i].position[1] += 4e-6f * (float)(turn % 1000);
     if (!pen_renderer_render(renderer, &request, &frame, &result, &variant->error)) {
         variant->status = VARIANT_FAILED;
@@ -113,10 +113,19 @@ static bool time_one(struct plan_variant *variant, const struct pen_result *firs
     return true;
 }
 
+static double frame_seconds(const struct pen_result *result)
+{
+    double ms = 0;
+    for (uint32_t p = 0; p < result->pass_count; p++)
+        ms += (double)result->passes[p].ms;
+    return ms / 1000;
+}
+
 /* Interleaved rounds over all variants that work, after one round of warming up. Slow ones take
- * part in a single round, cold: to them warming up matters little. */
-static void time_group(
-    struct plan_group *group, const struct picture *pictures, struct timing *timings, bool kept)
+ * part in a single round, cold: to them warming up matters little. `kept`, when not NULL: of the
+ * same image right after, for which shadow inputs need not be made again. */
+static void time_group(struct plan_group *group, const struct picture *pictures,
+    struct timing *moving, struct timing *kept)
 {
     static uint32_t turn;
     double began = seconds_now(), slow = group->seconds / SLOW_SHARE;
@@ -127,12 +136,11 @@ static void time_group(
         for (uint32_t i = 0; i < group->variant_count; i++) {
             struct plan_variant *variant = &group->variants[i];
             if (variant->status != VARIANT_OK || !strcmp(variant->name, "reference") ||
-                (pictures[i].seconds > slow && round != 1))
+                (frame_seconds(&pictures[i].result) > slow && round != 1))
                 continue;
-            /* Kept inputs: the image before it is the same one, whatever the turn of others. */
-            if (kept && !time_one(variant, &pictures[i].result, 0, NULL))
-                continue;
-            time_one(variant, &pictures[i].result, kept ? 0 : ++turn, round ? &timings[i] : NULL);
+            const struct pen_result *first = &pictures[i].result;
+            if (time_one(variant, first, ++turn, round ? &moving[i] : NULL) && kept)
+                time_one(variant, first, turn, round ? &kept[i] : NULL);
         }
     }
 }
@@ -177,6 +185,7 @@ static void write_variant(struct pen_json *json, const struct plan_group *group,
         for (int k = 0; k < 2; k++)
             pen_json_uint(json, NULL, result->subdivided_pixels[k]);
         pen_json_end(json);
+        pen_json_uint(json, "shadow_maps", result->shadow_maps);
         pen_json_uint(json, "gpu_bytes", result->gpu_bytes);
         pen_json_array(json, "warnings");
         for (uint32_t w = 0; w < result->warning_count; w++)
@@ -252,9 +261,7 @@ static void run_group(struct plan_group *group)
             take_pictures(&group->variants[i], &pictures[i]);
     struct timing *kept = timings + group->variant_count;
     if (group->repetitions)
-        time_group(group, pictures, timings, false);
-    if (group->repetitions && strchr(group->flags, 'k'))
-        time_group(group, pictures, kept, true);
+        time_group(group, pictures, timings, strchr(group->flags, 'k') ? kept : NULL);
     write_group(group, pictures, timings, kept);
     if (out_folder && strpbrk(group->flags, "pv"))
         compare_pictures(out_folder, group, pictures);

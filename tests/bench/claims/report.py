@@ -206,6 +206,9 @@ def write(out, device, mode, papers, groups, methods):
              "cannot be measured again; their ratios and orders can. On a software device passes "
              "cost what a processor needs for them: map passes weigh more than on a GPU, and so do "
              "verdicts that rest on them.</p>"]
+    if device.get("load") is not None:
+        parts.append("<p class=soft>%d processors; load average when the run began: %.1f.</p>" % (
+            device["processors"], device["load"]))
     if papers:
         parts.append("<h2 id=claims>Claims on trial</h2><p>Limits were set before the first run, "
                      "from the papers' figures. A scene's verdict comes from its median; a claim is "

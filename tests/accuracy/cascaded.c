@@ -28,7 +28,8 @@ static void scene(uint32_t kind, float height, uint8_t id[PEN_ID_BYTES])
     harness_scene(&(struct pen_generated_options){.kind = kind, .caster_height = height}, id);
 }
 
-/* Receivers that are casters themselves, with nothing skipped: exactly lit in all cascades. */
+/* Receivers that are casters themselves, at 60 degrees of incidence and with nothing skipped:
+ * exactly lit in all cascades. */
 static void check_lit(void)
 {
     static const char *const settings[] = {"", "&filter=texels", "&filter=texels&weights=uniform",
@@ -37,7 +38,9 @@ static void check_lit(void)
     scene(PEN_GENERATED_EMPTY_ROOM, 0, room);
     for (uint32_t i = 0; i < sizeof settings / sizeof *settings; i++) {
         char text[512];
-        snprintf(text, sizeof text, "technique=cascaded&classify=off&" ALONG HARNESS_RECT "%s",
+        snprintf(text, sizeof text,
+            "technique=cascaded&classify=off&" ALONG "&light.type=rect&light.position=6.9,4,0.3"
+            "&light.target=0,0,0&light.width=1&light.height=1%s",
             settings[i]);
         struct shot shot;
         harness_shot(room, text, &shot);

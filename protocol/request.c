@@ -91,7 +91,7 @@ static const struct pen_param light_rows[] = {
         .applies = PEN_LIGHT_BIT(PEN_LIGHT_SPOT),
         .help = "Half angle where intensity reaches zero."),
     LIGHT(color, .def_v = {1, 1, 1}, .max = 1e3, .help = "Linear RGB factor of the emission."),
-    LIGHT(power_w, .def = 100, .min = 0, .max = 1e9, .unit = "W", .applies = EMITTER | PUNCTUAL,
+    LIGHT(power_w, .def = 100, .min = 0, .max = 1e12, .unit = "W", .applies = EMITTER | PUNCTUAL,
         .help = "Radiant flux; 0 uses radiance instead."),
     LIGHT(radiance, .def = 0, .min = 0, .max = 1e9, .unit = "W m^-2 sr^-1", .applies = EMITTER,
         .help = "Emitted radiance, when power_w is 0."),

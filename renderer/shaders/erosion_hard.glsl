@@ -1,8 +1,8 @@
-// The hard shadow buffer of Klein et al. 2014: (lit, W of the blocker, bound of W, reach). W is F2's
-// window scale at unit distance, which stands for blocker and receiver depth in one and is the same
-// in all faces of a cube; it is negative where the silhouette test of variant direct fails. Bound: no
-// blocker of this receiver has a larger W; 0 where everything blocks. Reach: pixels that W = 1 makes
-// of the light's half extent, at most. What is proved to be lit is left as the target starts:
+// The hard shadow buffer of Klein et al. 2014: (lit, W of the blocker, bound of W, reach). W is the
+// window scale of erosion_window.glsl, which stands for blocker and receiver depth in one and is the
+// same in all faces of a cube; it is negative where the silhouette test of variant direct fails.
+// Bound: no blocker of this receiver has a larger W; 0 where everything blocks. Reach: pixels that
+// W = 1 makes of the light's half extent, at most. What is proved to be lit is left as the target starts:
 // (1, 0, 0, 0).
 #include "penumbra.glsl"
 #include "erosion_window.glsl"

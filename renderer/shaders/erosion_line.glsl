@@ -1,4 +1,4 @@
-// The distance of a pixel from a fitted edge, in half penumbra widths.
+// The distance of a pixel from a fitted edge, in half penumbra widths. Needs P(max_radius).
 #include "view.glsl"
 #include "light.glsl"
 #include "surface_plane.glsl"
@@ -22,6 +22,8 @@ float edge_distance(vec4 line, vec2 to, vec4 axes, Plane plane, bool lit)
     float half_width =
         line.w * (light.shape == SHAPE_DISK ? length(reach) : abs(reach.x) + abs(reach.y));
     half_width *= clamp(1.0 - across * dot(plane.gradient, line.xy) / plane.depth, 0.25, 4.0);
+    // No edge is looked for farther off, and a ramp that ends before it is done is a seam.
+    half_width = min(half_width, float(P(max_radius)) - 1.0);
     // Next to the edge the line decides which side this is, so that the stairs of the hard shadow do
     // not show; farther off, and past the edge's end, the hard shadow does.
     bool outside = abs(across) < 1.5 && along == 0.0 ? across >= 0.0 : lit;

@@ -1,7 +1,8 @@
 #include "renderer/passes/interleave.h"
 #include "renderer/passes/penumbra.h"
 #include "renderer/techniques/map_params.h"
-#include <stdio.h>
+#include <math.h>
+#include <string.h>
 
 static const char *const variant_names[] = {"pcf", "direct", NULL};
 enum { VARIANT_PCF, VARIANT_DIRECT };
@@ -44,7 +45,19 @@ static const struct pen_param rows[] = {
 struct inputs {
     const struct shadow_input *map, *min_max;
     const struct gl_texture *tiles; /* or NULL */
+    float unit[4];                  /* UnitBlock of erosion_window.glsl */
 };
+
+/* The depth of what the light sees, m, the same for all its faces. */
+static float depth_of(const struct light *light)
+{
+    float most = 0;
+    for (uint32_t i = 0; i < light->face_count; i++) {
+        const struct light_face *face = &light->faces[i];
+        most = fmaxf(most, face->parallel ? face->far_z - face->near_z : face->far_z);
+    }
+    return most;
+}
 
 /* Runs `body` over this face's receivers into a scratch texture. */
 static bool write_scratch(struct technique_run *run, enum pass_scratch_slot slot, const char *body,
@@ -62,7 +75,9 @@ static bool write_scratch(struct technique_run *run, enum pass_scratch_slot slot
             .textures = &pyramid,
             .texture_count = 1,
             .tiles = inputs->tiles,
-            .framebuffer = framebuffer},
+            .framebuffer = framebuffer,
+            .extra = inputs->unit,
+            .extra_bytes = sizeof inputs->unit},
         error);
     gl.DeleteFramebuffers(1, &framebuffer);
     return ok;
@@ -76,6 +91,8 @@ static bool write_hard(
     static const float lit[4] = {1};
     const struct erosion *params = run->params;
     const struct gl_texture *hard = pass_scratch(run, SCRATCH_HARD, GL_RGBA16F, 1);
+    memset(inputs, 0, sizeof *inputs);
+    inputs->unit[0] = depth_of(run->light);
     inputs->map = pass_caster_map(run, params->map_size, error);
     inputs->min_max = inputs->map ? pass_caster_min_max(run, params->map_size, error) : NULL;
     if (!inputs->min_max)
@@ -162,7 +179,9 @@ static bool record_pcf(struct technique_run *run, struct pen_error *error)
         .shadow = &inputs.map->textures[0],
         .textures = textures,
         .texture_count = 2,
-        .tiles = inputs.tiles};
+        .tiles = inputs.tiles,
+        .extra = inputs.unit,
+        .extra_bytes = sizeof inputs.unit};
     /* The average knows nothing of other faces. */
     bool smooth = params->smooth.on && !run->face->cube;
     return smooth ? pass_interleaved(run, &pass, error) : pass_screen(run, &pass, error);

@@ -47,7 +47,7 @@ vec4 visibility(Surface s)
     vec2 q = light_project(s.p), texel = light_texel(shadow_map);
     vec2 inverse_size = 1.0 / (light.rect.zw - light.rect.xy), uv = light_uv(q);
     if (w > 0.0)
-        w = min(edge_mean(s.pixel, radius), hard.z);
+        w = min(edge_mean(s.pixel, radius), min(hard.z, float(P(max_radius)) / hard.w));
     vec2 extent = max(window_extent * w, P(min_filter) * texel);
     ReceiverPlane plane = receiver_plane(s.p, s.n);
     float bias = P(bias) * s.p.z * light_depth_slope(s.p.z), lit = 0.0;

@@ -88,6 +88,37 @@ static void check_widths(void)
     }
 }
 
+/* A light that is large and far away, in metres or because the scene's unit is small: what the
+ * methods keep in half floats must neither overflow nor vanish. */
+static void check_far_light(void)
+{
+    struct planar_case t = {.c = 1.2, .h = 300, .a = 50};
+    for (int i = 0; i < METHODS; i++) {
+        double rmse = deviation(PEN_GENERATED_HALF_PLANE, methods[i], HARNESS_VIEW,
+            "&light.type=rect&light.position=0,300,0&light.target=0,0,0&light.up=0,0,-1"
+            "&light.width=100&light.height=100",
+            truth_half_plane, &t)
+                          .rmse;
+        CHECK(rmse < 0.012);
+    }
+}
+
+/* A penumbra of 85 px that may only reach 32 px to each side of its edge is narrower, but still a
+ * ramp: nothing is cut off. */
+static void check_bounded_radius(const char *method)
+{
+    struct shot shot;
+    double step = 0;
+    shoot(PEN_GENERATED_HALF_PLANE, 1.2f, method, HARNESS_VIEW, HARNESS_RECT, &shot);
+    for (uint32_t x = 1; x < shot.width; x++) {
+        const float *v = shot.visibility + 4 * (shot.height / 2 * shot.width + x);
+        step = fmax(step, fabsf(v[3] - v[-1]));
+    }
+    fprintf(stderr, "%-50s largest step %.4f\n", method, step);
+    harness_shot_finish(&shot);
+    CHECK(step < 2.5 / 64);
+}
+
 /* The edge runs 1 : 3 over the pixels; the fitted lines must undo its stairs. All edges in a strip
  * of 1 / sqrt 10 = 0.316 px make the same stairs, and no fit can tell them apart: the camera is
  * moved by half of that, so that the true edge is the strip's middle and not its border. */
@@ -285,6 +316,9 @@ int main(int argc, char **argv)
     for (int i = 0; i < METHODS; i++)
         check_closed_forms(methods[i], limits[i]);
     check_widths();
+    check_far_light();
+    check_bounded_radius("erosion&max_radius=32");
+    check_bounded_radius("erosion&variant=direct&max_radius=32");
     check_line_fit();
     for (int i = 0; i < METHODS; i++)
         check_depth_step(methods[i]);

@@ -67,6 +67,9 @@ struct technique_run {
 
 struct technique {
     struct pen_technique_info info;
+    /* Its visibility already is the mean over the light above the receiver's horizon, faded as
+     * horizon.glsl says; of the other methods pass_screen fades it. */
+    bool counts_horizon;
     size_t state_size;
     bool (*create)(struct technique_ctx *, void *state, struct pen_error *); /* optional */
     bool (*record)(struct technique_run *, struct pen_error *);

@@ -70,8 +70,10 @@ bool pass_screen(struct technique_run *run, const struct pass_screen *pass, stru
 {
     struct technique_ctx *ctx = run->ctx;
     char defines[1024];
-    snprintf(defines, sizeof defines, "#define LIGHT_SHAPE %d\n#define LIGHT_PARALLEL %d\n%s",
-        run->face->shape, run->face->parallel, pass->defines ? pass->defines : "");
+    bool fade = !pass->framebuffer && !run->technique->counts_horizon;
+    snprintf(defines, sizeof defines, "#define LIGHT_SHAPE %d\n#define LIGHT_PARALLEL %d\n%s%s",
+        run->face->shape, run->face->parallel, fade ? "#define HORIZON_FADE\n" : "",
+        pass->defines ? pass->defines : "");
     struct gl_program_desc desc = {.vertex = pass->tiles ? "tiles.vert" : "screen.vert",
         .fragment = "screen.frag",
         .body = pass->body,

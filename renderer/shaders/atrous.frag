@@ -38,5 +38,5 @@ void main()
             sum += w * ratio_at(at);
             total += w;
         }
-    ratio_write(sum / total);
+    ratio_write(pixel, sum / total);
 }

@@ -8,6 +8,7 @@
 layout(binding = 7) uniform sampler2DArray caster_maps; // hardware depth, nearest layer first
 #define MIN_MAX_LAYERED
 #include "min_max.glsl"
+#include "horizon.glsl"
 
 // The method's: the part `share` of the rectangle low .. high is hidden.
 void add_patch(vec2 low, vec2 high, float share);
@@ -26,6 +27,8 @@ struct PatchWindow {
     float depth;     // of the receiver
     vec2 gradient;   // of the depth of its plane, per e
     float bias;
+    float above;     // share of the emitter above the receiver's horizon; patches hide of that
+    HorizonBack back; // gradient per e
     float widest;    // depth - d of the nearest caster: its shadow is as wide as the window
     float narrowest; // the least that was met: of the sharpest shadow
 };
@@ -50,11 +53,14 @@ PatchWindow patch_window(Surface s)
     w.origin = (light.rect.xy - w.q) / unit;
     w.texel = texel / unit;
     w.gradient = plane.gradient * unit;
+    w.above = max(horizon_share(s.p, s.n), 1e-3);
+    w.back = horizon_back(s.p, s.n, w.bias);
+    w.back.gradient *= unit;
     vec2 z = min_max_window(w.q, w.reach);
     vec2 low = w.q - w.reach, high = w.q + w.reach;
     bool inside = all(greaterThan(low, light.rect.xy)) && all(lessThan(high, light.rect.zw));
     float least_plane = min(plane.depth - dot(abs(plane.gradient), w.reach), 1.0) - w.bias;
-    bool all_hide = inside && z.y < s.p.z && light_depth(z.y) < least_plane;
+    bool all_hide = inside && z.y < s.p.z && light_depth(z.y) < least_plane && w.back.depth < 0.0;
     w.answer = z.x >= s.p.z ? LIT : all_hide ? UMBRA : PENUMBRA;
     w.widest = w.narrowest = max(w.depth - light_depth(min(nearest_z, s.p.z)), 1e-20);
     return w;
@@ -109,17 +115,19 @@ void walk_quadtree(inout PatchWindow w, int layer, ivec2 root, int root_level)
         vec2 low = w.origin + vec2(at << level) * w.texel;
         vec2 high = w.origin + vec2((at + 1) << level) * w.texel, side = float(1 << level) * w.texel;
         float plane = min(w.depth + dot(w.gradient, low + 0.5 * side), 1.0);
+        float back = back_depth(w.back, low + 0.5 * side);
         float slack = level > 0 ? 0.5 * dot(abs(w.gradient), side) : 0.0;
+        float back_slack = level > 0 ? 0.5 * dot(abs(w.back.gradient), side) : 0.0;
         // Who lies before the receiver and before its plane hides.
         float least = min(plane - slack - w.bias, w.depth);
         float most = min(min(plane + slack, 1.0) - w.bias, w.depth);
-        bool whole = d.y < least;
+        bool whole = d.y < least && d.x > back + back_slack;
         // The receiver's own plane: depth is linear over the map, so the mean is the middle's.
         bool own = d.x >= plane - slack - w.bias && d.y <= plane + slack + w.bias &&
             abs(d.z - plane) <= w.bias;
         float widest = w.depth - d.x;
         bool beside = any(greaterThan(low, vec2(widest))) || any(lessThan(high, vec2(-widest)));
-        bool open = d.x < most && !own && !beside;
+        bool open = d.x < most && d.y > back - back_slack && !own && !beside;
         // Fine enough for its own shadow: casters near the receiver need finer texels than the
         // nearest to the light does.
         bool leaf = level == 0 || max(side.x, side.y) * 0.5 * float(P(kernel)) <= widest ||
@@ -127,7 +135,7 @@ void walk_quadtree(inout PatchWindow w, int layer, ivec2 root, int root_level)
         if (open && leaf) {
             // Part of a coarse texel: the near depth hides as much as makes the mean of the two
             // depths. Where the plane runs through the texel its middle decides.
-            bool mixed = !whole && d.x < least;
+            bool mixed = !whole && d.x < least && w.back.depth < 0.0;
             float share = mixed ? (d.y - d.z) / max(d.y - d.x, 1e-20) : 1.0;
             float limit = min(plane - w.bias, w.depth);
             float depth = whole ? d.z : mixed ? d.x : middle;
@@ -137,7 +145,7 @@ void walk_quadtree(inout PatchWindow w, int layer, ivec2 root, int root_level)
             a.x = filled_border(w, at - ivec2(1, 0), layer, level, limit, depth, low.x, a.x);
             a.y = filled_border(w, at - ivec2(0, 1), layer, level, limit, depth, low.y, a.y);
 #endif
-            if (depth < limit) {
+            if (depth < limit && depth > back) {
                 add_patch(a, b, share);
                 w.narrowest = min(w.narrowest, below);
             }

@@ -1,6 +1,7 @@
 // Klein et al. 2014, variant direct: the shadow factor from the distance to the nearest edge. Their
 // s_outer = (w - d) / 2w with w half the penumbra, as visibility and over both sides at once.
 #include "erosion_line.glsl"
+#include "pixel_horizon.glsl"
 layout(binding = 10) uniform sampler2D seeds;
 layout(location = 0) out vec4 vis;
 
@@ -21,5 +22,5 @@ void main()
                                       : 0.5 + 0.5 * t;
         v = abs(t) < 1.0 ? v : hard.x;
     }
-    vis = scalar_visibility(v);
+    vis = scalar_visibility(light.cube != 0 ? v : pixel_horizon_fade(pixel) * v);
 }

@@ -6,6 +6,9 @@
 //   TEXTURED:          ratio_lit rgb and a (mean) arrived, ratio_all rgb and a of
 //   FROM_HARD:         the hard visibility of penumbra_estimate.glsl
 #include "light.glsl"
+#ifdef LAST
+#include "pixel_horizon.glsl"
+#endif
 layout(binding = 7) uniform sampler2D spread_map; // see penumbra_estimate.glsl
 #ifndef FROM_HARD
 layout(binding = 8) uniform sampler2D ratio_lit;
@@ -56,16 +59,26 @@ layout(location = 1) out vec4 out_all;
 layout(location = 0) out vec2 out_lit;
 #endif
 
-void ratio_write(RATIO r)
+#ifdef LAST
+// Of the light above the horizon. Seen from a light in all directions the faces of its map have a
+// horizon each, and its share is that of the samples.
+float ratio_fade(ivec2 pixel, float share)
+{
+    return light.cube != 0 ? horizon_fade(share) : pixel_horizon_fade(pixel);
+}
+#endif
+
+void ratio_write(ivec2 pixel, RATIO r)
 {
 #if defined(LAST) && defined(TEXTURED)
     float mean = clamp(r[0].a / max(r[1].a, 1e-6), 0.0, 1.0);
     // A colour that none of the samples emits has no ratio of its own.
     vec3 share = mix(vec3(mean), clamp(r[0].rgb / max(r[1].rgb, 1e-6), 0.0, 1.0),
         step(1e-3 * r[1].a, r[1].rgb));
-    vis = vec4(light.emission_mean.rgb * share, mean);
+    vis = ratio_fade(pixel, r[1].a) * vec4(light.emission_mean.rgb * share, mean);
 #elif defined(LAST)
-    vis = scalar_visibility(clamp(r.x / max(r.y, 1e-6), 0.0, 1.0));
+    float mean = clamp(r.x / max(r.y, 1e-6), 0.0, 1.0);
+    vis = scalar_visibility(ratio_fade(pixel, r.y) * mean);
 #elif defined(TEXTURED)
     out_lit = r[0];
     out_all = r[1];

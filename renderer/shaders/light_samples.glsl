@@ -21,23 +21,25 @@ layout(std140, binding = 3) uniform SampleBlock {
 vec2 look_up(Surface s, int i, float depth, float bias)
 {
     vec2 at = batch.samples[i].at.xy, l;
-    float range = light.far_z - light.near_z, facing, slope;
+    float range = light.far_z - light.near_z, facing, least, slope;
     if (light.parallel != 0) {
         l = s.p.xy + at * s.p.z;
         facing = dot(s.n.xy, at) - s.n.z;
-        slope = 1.0 / (max(facing, 0.02) * range);
+        least = 0.02;
+        slope = 1.0 / (max(facing, least) * range);
     } else {
         l = at + (s.p.xy - at) * (light.near_z / s.p.z);
         facing = dot(s.n.xy, at) - dot(s.n, s.p);
-        slope = light.far_z / (range * max(facing, 0.02 * length(s.p)));
+        least = 0.02 * length(s.p);
+        slope = light.far_z / (range * max(facing, least));
     }
     // The receiver's plane at the texel's centre (F6, the origin moved to the sample).
     vec4 window = batch.samples[i].window;
     vec2 size = vec2(textureSize(maps, 0).xy), uv = l * window.xy + window.zw, texel = uv * size;
     vec2 offset = (floor(texel) + 0.5 - texel) / (size * window.xy);
     float plane = min(depth + slope * dot(s.n.xy, offset), 1.0) - bias;
-    // Light below the receiver's horizon is left out of the mean: irradiance is clipped there.
-    float w = facing > 0.0 ? 1.0 : 0.0;
+    // As sample_weight in sample_maps.glsl.
+    float w = facing > least ? 1.0 : facing > 0.0 ? 1e-3 : 0.0;
 #ifdef EMITTED
     return vec2(w, w);
 #else

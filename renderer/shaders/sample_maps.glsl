@@ -51,6 +51,14 @@ SampleView sample_view(SampledReceiver r, vec2 at)
     return v;
 }
 
+// How much the sample counts: not at all below the receiver's horizon. Where it grazes the receiver
+// its map cannot tell them apart, and irradiance is next to nothing: it counts where no other does.
+float sample_weight(SampledReceiver r, SampleView v)
+{
+    float least = light_parallel ? 0.02 : r.least;
+    return v.facing > least ? 1.0 : v.facing > 0.0 ? 1e-3 : 0.0;
+}
+
 // Depth that a map's texel must reach for the receiver to be lit, `offset` metres beside v.l.
 float sample_plane(SampledReceiver r, SampleView v, vec2 offset)
 {

@@ -1,6 +1,9 @@
 // A method's visibility() for every receiver of this face. The target starts at 1.
 #include "surface.glsl"
 #include "BODY"
+#ifdef HORIZON_FADE // the target is the method's visibility
+#include "horizon.glsl"
+#endif
 
 layout(location = 0) out vec4 vis;
 
@@ -27,5 +30,8 @@ void main()
         if (!light_is_above_horizon(s.p, s.n))
             s.n = surface_shading_normal(pixel);
         vis = light_is_above_horizon(s.p, s.n) ? visibility(s) : vec4(0.0);
+#ifdef HORIZON_FADE
+        vis *= horizon_fade(horizon_share(s.p, s.n));
+#endif
     }
 }

@@ -38,6 +38,7 @@ void walk_points(PatchWindow w, float receiver_z)
         reach = max(reach, light_search_extent(receiver_z));
     ivec2 size = textureSize(caster_maps, 0).xy;
     vec2 to_texels = vec2(size) / (light.rect.zw - light.rect.xy);
+    vec2 to_e = to_texels * w.texel; // per metre
     vec2 pitch = 2.0 * reach / float(P(kernel));
     int k = w.answer == LIT ? 0 : int(P(kernel));
     for (int layer = 0; layer < P(layers); layer++)
@@ -46,10 +47,11 @@ void walk_points(PatchWindow w, float receiver_z)
                 vec2 low = vec2(x, y) * pitch - reach, middle = low + 0.5 * pitch;
                 vec2 at = (w.q + middle - light.rect.xy) * to_texels;
                 float d = min(at.x, at.y) < 0.0 ? 1.0 : caster_depth(ivec2(max(at, 0.0)), layer);
-                vec2 scale = to_texels * w.texel; // e per metre
-                float plane = min(w.depth + dot(w.gradient, middle * scale), 1.0) - w.bias;
-                scale /= max(w.depth - d, 1e-20);
-                if (d < min(plane, w.depth))
+                // The texel's depth is that of its centre.
+                vec2 e = middle * to_e + (floor(at) + 0.5 - at) * w.texel;
+                float plane = min(w.depth + dot(w.gradient, e), 1.0) - w.bias;
+                vec2 scale = to_e / max(w.depth - d, 1e-20);
+                if (d < min(plane, w.depth) && d > back_depth(w.back, e))
                     add_patch(low * scale, (low + pitch) * scale, 1.0);
             }
 }
@@ -70,8 +72,7 @@ vec4 visibility(Surface s)
         return vec4(0.0);
 #endif
 #if P_layers > 1
-    return scalar_visibility(bits_lit_share());
-#else
-    return scalar_visibility(clamp(1.0 - hidden_share, 0.0, 1.0));
+    hidden_share = 1.0 - bits_lit_share();
 #endif
+    return scalar_visibility(clamp(1.0 - hidden_share / w.above, 0.0, 1.0));
 }

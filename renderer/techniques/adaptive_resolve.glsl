@@ -25,7 +25,7 @@ vec4 visibility(Surface s)
     vec3 all_emission = vec3(0.0), lit_emission = vec3(0.0);
     for (int i = 0; i < count; i++) {
         SampleMap map = tree.samples[i];
-        float w = sample_view(r, map.at.xy).facing > 0.0 ? map.layer.y : 0.0;
+        float w = sample_weight(r, sample_view(r, map.at.xy)) * map.layer.y;
         vec3 e = light.textured != 0 ? light_emission(map.at.zw, map.layer.z) : vec3(1.0);
         all_sum += w;
         all_emission += w * e;
@@ -45,11 +45,9 @@ vec4 visibility(Surface s)
     lit_sum = sum.a;
     lit_emission = sum.rgb;
 #endif
-    // Where little of the light is above the horizon the mean rests on a few samples: there it fades
-    // to 0, as in the multi-sampled reference.
-    float fade = min(4.0 * all_sum, 1.0), v = clamp(fade * lit_sum / max(all_sum, 1e-20), 0.0, 1.0);
+    float v = clamp(lit_sum / max(all_sum, 1e-20), 0.0, 1.0);
     if (light.textured == 0)
         return scalar_visibility(v);
-    vec3 seen_share = clamp(fade * lit_emission / max(all_emission, vec3(1e-20)), 0.0, 1.0);
+    vec3 seen_share = clamp(lit_emission / max(all_emission, vec3(1e-20)), 0.0, 1.0);
     return vec4(light.emission_mean.rgb * seen_share, v);
 }

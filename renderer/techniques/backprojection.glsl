@@ -25,9 +25,9 @@ vec4 visibility(Surface s)
     walk_patches(w);
     if (w.answer == UMBRA)
         return vec4(0.0);
-    float lit = clamp(1.0 - hidden_share, 0.0, 1.0);
+    float lit = clamp(1.0 - hidden_share / w.above, 0.0, 1.0);
 #ifdef TEXTURED
-    vec3 hidden = hidden_emission / max(emission_below(vec2(1.0)), 1e-6);
+    vec3 hidden = hidden_emission / max(w.above * emission_below(vec2(1.0)), 1e-6);
     return vec4(light.emission_mean.rgb * clamp(1.0 - hidden, 0.0, 1.0), lit);
 #else
     return scalar_visibility(lit);

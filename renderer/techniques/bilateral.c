@@ -47,5 +47,6 @@ const struct technique technique_bilateral = {
         .textured = true,
         .struct_size = sizeof(struct bilateral),
         .params = {rows, sizeof rows / sizeof *rows}},
+    .counts_horizon = true,
     .record = record,
 };

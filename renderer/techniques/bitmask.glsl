@@ -19,17 +19,17 @@ void add_patch(vec2 low, vec2 high, float share)
 }
 
 #ifdef TEXTURED
-// Share of each channel's emission that comes from the points that are not hidden.
-vec3 emission_lit_share(int pattern)
+// Share of each channel's emission that comes from points that are hidden.
+vec3 emission_hidden_share(int pattern)
 {
-    vec3 lit = vec3(0.0), all = vec3(0.0);
+    vec3 hidden = vec3(0.0), all = vec3(0.0);
     for (int i = 0; i < LIGHT_BITS; i++) {
         uint word = hidden_bits[i >> 7][i >> 5 & 3];
         vec3 e = texelFetch(bit_emission, ivec2(i, pattern), 0).rgb;
         all += e;
-        lit += (word >> (i & 31) & 1u) != 0u ? vec3(0.0) : e;
+        hidden += (word >> (i & 31) & 1u) != 0u ? e : vec3(0.0);
     }
-    return lit / max(all, 1e-6);
+    return hidden / max(all, 1e-6);
 }
 #endif
 
@@ -44,7 +44,8 @@ vec4 visibility(Surface s)
     }
     bits_begin(pattern);
     walk_patches(w);
-    float lit = w.answer == UMBRA ? 0.0 : bits_lit_share();
+    float hidden = w.answer == UMBRA ? 1.0 : (1.0 - bits_lit_share()) / w.above;
+    float lit = max(1.0 - hidden, 0.0);
 #ifdef INTERLEAVED
     // Width on the screen, F5, of the sharpest shadow here, for the averaging pass.
     float scale = light_parallel ? 1.0 : s.p.z / light.near_z;
@@ -54,7 +55,8 @@ vec4 visibility(Surface s)
 #elif defined(TEXTURED)
     if (lit == 0.0 || lit == 1.0)
         return scalar_visibility(lit);
-    return vec4(light.emission_mean.rgb * emission_lit_share(pattern), lit);
+    vec3 lit_emission = max(1.0 - emission_hidden_share(pattern) / w.above, 0.0);
+    return vec4(light.emission_mean.rgb * lit_emission, lit);
 #else
     return scalar_visibility(lit);
 #endif

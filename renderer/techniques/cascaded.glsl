@@ -16,17 +16,15 @@ float ramp(float d, float from, float to)
 
 // Half extents on the map plane that one sample's kernel must cover to meet its neighbours': the
 // image of its part of the emitter, for the mean depth of what blocks (F3). Negative: nothing blocks.
-// `above`: share of the emitter above the receiver's horizon, where something may block.
-vec2 kernel_extent(SampledReceiver r, vec2 size, vec2 q, out float above)
+vec2 kernel_extent(SampledReceiver r, vec2 size, vec2 q)
 {
-    float nearest_z, sum = 0.0, blockers = 0.0, share = 0.0;
+    float nearest_z, sum = 0.0, blockers = 0.0;
     vec2 texel = (light.rect.zw - light.rect.xy) / vec2(2 * textureSize(min_max_pyramid, 0));
     vec2 search = min_max_search_extent(q, r.p.z, texel, nearest_z) / float(SIDE);
     int count = nearest_z < r.p.z ? cascade.count.x : 0;
     for (int i = 0; i < count; i++) {
         SampleMap map = cascade.samples[i];
         SampleView v = sample_view(r, map.at.xy);
-        share += v.facing > 0.0 ? map.layer.y : 0.0;
         for (int k = 0; k < (map.layer.x < 0.0 ? 0 : 4); k++) {
             vec2 offset = (vec2(k & 1, k >> 1) - 0.5) * search;
             vec2 d = sample_depths(maps, size, map, r, v, offset);
@@ -36,7 +34,6 @@ vec2 kernel_extent(SampledReceiver r, vec2 size, vec2 q, out float above)
             }
         }
     }
-    above = count == 0 ? 1.0 : share;
     if (blockers == 0.0)
         return vec2(-1.0);
     return light_filter_extent(min(sum / blockers, r.p.z), r.p.z) / float(SIDE);
@@ -73,10 +70,9 @@ vec4 visibility(Surface s)
     vec2 size = vec2(textureSize(maps, 0).xy), q = light_project(s.p), extent = vec2(0.0);
     SampledReceiver r = sampled_receiver(s, P(bias));
     int count = cascade.count.x;
-    float above = 1.0;
 #if KERNEL > 1
     if (P(filter) == FILTER_BRIDGE) {
-        extent = kernel_extent(r, size, q, above);
+        extent = kernel_extent(r, size, q);
         count = extent.x < 0.0 ? 0 : count; // a dynamic bound skips the loop, a return would not
     }
 #endif
@@ -86,7 +82,7 @@ vec4 visibility(Surface s)
     for (int i = 0; i < count; i++) {
         SampleMap map = cascade.samples[i];
         SampleView v = sample_view(r, map.at.xy);
-        float w = v.facing > 0.0 ? map.layer.y : 0.0, lit = 1.0;
+        float w = sample_weight(r, v) * map.layer.y, lit = 1.0;
         if (map.layer.x >= 0.0) {
 #if KERNEL > 1
             if (P(filter) == FILTER_BRIDGE)
@@ -107,12 +103,8 @@ vec4 visibility(Surface s)
     float v = 1.0;
     vec3 seen = vec3(1.0);
     if (count > 0) {
-        above = all_sum;
         v = lit_sum / max(all_sum, 1e-20);
         seen = light.textured != 0 ? lit_emission / max(all_emission, vec3(1e-20)) : vec3(v);
     }
-    // Where little of the light is above the horizon the mean rests on a few samples: there it fades
-    // to 0, as in the multi-sampled reference.
-    float fade = min(above * 4.0, 1.0);
-    return share * vec4(light.emission_mean.rgb * (1.0 - fade * seen), 1.0 - fade * v);
+    return share * vec4(light.emission_mean.rgb * (1.0 - seen), 1.0 - v);
 }

@@ -25,7 +25,7 @@ static const struct pen_param rows[] = {
                 "from the distance to the nearest edge (direct)."),
     MAP_SIZE_ROW(struct erosion, 2048),
     BIAS_ROW(struct erosion),
-    PARAM(struct erosion, max_radius, .def = 128, .min = 2, .max = 512, .unit = "px",
+    PARAM(struct erosion, max_radius, .def = 256, .min = 2, .max = 512, .unit = "px",
         .help = "Largest half width of a penumbra on the screen."),
     PARAM(struct erosion, filter_taps, .def = 32, .min = 1, .max = 256, .specialise = 1,
         .help = "Depth comparisons of the filter; variant pcf."),

@@ -2,6 +2,7 @@
 // width, found in the edge pyramid, and percentage-closer filtering runs only there.
 #include "taps.glsl"
 #include "dither.glsl"
+#include "horizon.glsl"
 #include "erosion_window.glsl"
 layout(binding = 7) uniform sampler2D hard_map;
 layout(binding = 8) uniform sampler2D edge_pyramid; // trilinear
@@ -42,15 +43,20 @@ vec4 visibility(Surface s)
     float w = hard.z > 0.0 ? edge_within(s.pixel, radius) : 0.0;
     radius = clamp(w * hard.w, 1.5, radius);
     w = w > 0.0 ? edge_within(s.pixel, radius) : 0.0;
-    int count = w > 0.0 ? P(filter_taps) : 0;
+    float bias = P(bias) * s.p.z * light_depth_slope(s.p.z), lit = 0.0, all = 0.0;
+    HorizonBack back = horizon_back(s.p, s.n, bias);
+    // Where the light's centre sees the receiver's back there is no edge to grow from, and all that
+    // may block counts.
+    bool turned = back.depth > 0.0 && hard.z > 0.0;
+    int count = turned || w > 0.0 ? P(filter_taps) : 0;
 
     vec2 q = light_project(s.p), texel = light_texel(shadow_map);
     vec2 inverse_size = 1.0 / (light.rect.zw - light.rect.xy), uv = light_uv(q);
     if (w > 0.0)
         w = min(edge_mean(s.pixel, radius), min(hard.z, float(P(max_radius)) / hard.w));
+    w = turned ? hard.z : w;
     vec2 extent = max(window_extent * w, P(min_filter) * texel);
     ReceiverPlane plane = receiver_plane(s.p, s.n);
-    float bias = P(bias) * s.p.z * light_depth_slope(s.p.z), lit = 0.0;
 #ifdef INTERLEAVED
     vec2 shift = dither2(s.pixel, view.display.z);
 #else
@@ -58,11 +64,14 @@ vec4 visibility(Surface s)
 #endif
     Taps taps = taps_begin(P(filter_taps), shift);
     for (int i = 0; i < count; i++) {
-        vec2 offset = taps_next(taps) * extent;
+        vec2 e = taps_next(taps), offset = e * extent;
         float d = texture(shadow_map, uv + offset * inverse_size).r;
-        lit += plane_depth(plane, offset, bias) <= d ? 1.0 : 0.0;
+        bool blocked = d < plane_depth(plane, offset, bias) && d > back_depth(back, offset);
+        float above = horizon_height(s.p, s.n, e) > 0.0 ? 1.0 : 0.0;
+        lit += blocked ? 0.0 : above;
+        all += above;
     }
-    float v = count > 0 ? lit / float(count) : max(hard.x, 0.0);
+    float v = count > 0 ? lit / max(all, 1.0) : max(hard.x, 0.0);
 #ifdef INTERLEAVED
     return vec4(v, count > 0 ? 2.0 * w * hard.w : 0.0, 0.0, 1.0);
 #else

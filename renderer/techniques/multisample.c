@@ -87,5 +87,6 @@ const struct technique technique_multisample = {
         .textured = true,
         .struct_size = sizeof(struct multisample),
         .params = {rows, sizeof rows / sizeof *rows}},
+    .counts_horizon = true,
     .record = record,
 };

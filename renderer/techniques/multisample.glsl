@@ -22,7 +22,7 @@ vec4 visibility(Surface s)
         float d2 = dot(to, to), f = max(v.facing, 0.0);
         float w = light_parallel ? f : f * s.p.z / (d2 * d2);
 #else
-        float w = v.facing > 0.0 ? 1.0 : 0.0;
+        float w = sample_weight(r, v);
 #endif
         sum += light.textured != 0
             ? vec4(light_emission(map.at.zw, 0.0) * w * lit, w)

@@ -5,11 +5,9 @@ vec4 visibility(Surface s)
 {
     vec4 sum = texelFetch(accumulated, s.pixel, 0);
     // A textured light's mean visibility is that of its luminance: there is no fifth channel.
-#if P_weighting == 0
-    // a: the share of the light above the horizon.
-    sum.rgb /= horizon_weight(sum.a);
-#else
     sum.rgb /= max(sum.a, 1e-20);
+#if P_weighting == 0
+    sum.rgb *= horizon_fade(horizon_share(s.p, s.n));
 #endif
     if (light.textured == 0)
         return scalar_visibility(sum.r);

@@ -1,6 +1,7 @@
 // Fernando 2005 with exact projections (F3, F4 of the light frame) and the receiver's plane.
 #include "taps.glsl"
 #include "min_max.glsl"
+#include "horizon.glsl"
 
 vec4 visibility(Surface s)
 {
@@ -10,6 +11,7 @@ vec4 visibility(Surface s)
     // A tap lands anywhere in its texel, whose depth is that of its centre: half a texel along the
     // plane's slope is the most they can differ by on the receiver itself.
     float bias = P(bias) * s.p.z * light_depth_slope(s.p.z) + 0.5 * dot(abs(plane.gradient), texel);
+    HorizonBack back = horizon_back(s.p, s.n, bias);
     vec2 shift = P(smooth) ? frame_shift(s.pixel) : vec2(0.5);
 
     float nearest_z;
@@ -20,7 +22,7 @@ vec4 visibility(Surface s)
     for (int i = 0; i < search_count; i++) {
         vec2 offset = taps_next(taps) * search;
         float d = texture(shadow_map, uv + offset * inverse_size).r;
-        if (d < plane_depth(plane, offset, bias)) {
+        if (d < plane_depth(plane, offset, bias) && d > back_depth(back, offset)) {
             sum += light_linear(d);
             blockers += 1.0;
         }
@@ -31,13 +33,18 @@ vec4 visibility(Surface s)
     vec2 extent = max(light_filter_extent(caster_z, s.p.z), P(min_filter) * texel);
     int count = blockers > 0.0 ? P(filter_taps) : 0;
     taps = taps_begin(P(filter_taps), shift);
-    float lit = 0.0;
+    // A tap stands for the point of the light that it can hide (F2); those below the receiver's
+    // horizon are left out of the mean.
+    float lit = 0.0, all = 0.0;
     for (int i = 0; i < count; i++) {
-        vec2 offset = taps_next(taps) * extent;
+        vec2 e = taps_next(taps), offset = e * extent;
         float d = texture(shadow_map, uv + offset * inverse_size).r;
-        lit += plane_depth(plane, offset, bias) <= d ? 1.0 : 0.0;
+        bool blocked = d < plane_depth(plane, offset, bias) && d > back_depth(back, offset);
+        float above = horizon_height(s.p, s.n, e) > 0.0 ? 1.0 : 0.0;
+        lit += blocked ? 0.0 : above;
+        all += above;
     }
-    float v = count > 0 ? lit / float(count) : 1.0;
+    float v = count > 0 ? lit / max(all, 1.0) : 1.0;
 #ifdef INTERLEAVED
     // Width of the penumbra on the screen, F5, for the averaging pass.
     float scale = light_parallel ? 1.0 : s.p.z / light.near_z;

@@ -199,6 +199,7 @@ const struct technique technique_raytraced = {
         .textured = true,
         .struct_size = sizeof(struct raytraced),
         .params = {rows, sizeof rows / sizeof *rows}},
+    .counts_horizon = true,
     .state_size = sizeof(struct state),
     .record = record,
     .destroy = destroy,

@@ -51,5 +51,6 @@ const struct technique technique_stochastic = {
         .textured = true,
         .struct_size = sizeof(struct stochastic),
         .params = {rows, sizeof rows / sizeof *rows}},
+    .counts_horizon = true,
     .record = record,
 };

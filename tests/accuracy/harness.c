@@ -27,6 +27,18 @@ struct pen_renderer *harness_renderer(void)
     return renderer;
 }
 
+void harness_scene_blob(void *data, size_t bytes, const uint8_t id[PEN_ID_BYTES])
+{
+    struct pen_error error = {0};
+    int fd = memfd_create("scene", MFD_CLOEXEC);
+    if (fd < 0 || write(fd, data, bytes) != (ssize_t)bytes)
+        exit(1);
+    free(data);
+    if (!pen_renderer_load_scene(harness_renderer(), id, fd, &error))
+        die("load", &error);
+    close(fd);
+}
+
 void harness_scene(const struct pen_generated_options *options, uint8_t id[PEN_ID_BYTES])
 {
     struct pen_error error = {0};
@@ -38,13 +50,7 @@ void harness_scene(const struct pen_generated_options *options, uint8_t id[PEN_I
         return;
     if (!pen_generate_blob(options, &data, &bytes, &error))
         die("generate", &error);
-    int fd = memfd_create("scene", MFD_CLOEXEC);
-    if (fd < 0 || write(fd, data, bytes) != (ssize_t)bytes)
-        exit(1);
-    free(data);
-    if (!pen_renderer_load_scene(renderer, id, fd, &error))
-        die("load", &error);
-    close(fd);
+    harness_scene_blob(data, bytes, id);
 }
 
 bool harness_scene_file(const char *path, uint8_t id[PEN_ID_BYTES])

@@ -17,6 +17,8 @@ struct pen_renderer *harness_renderer(void);
 
 /* Loads a generated scene once per options; `id` is written. Exits on failure. */
 void harness_scene(const struct pen_generated_options *options, uint8_t id[PEN_ID_BYTES]);
+/* The same of a blob made elsewhere, which is freed; the caller chooses `id`. */
+void harness_scene_blob(void *data, size_t bytes, const uint8_t id[PEN_ID_BYTES]);
 /* Loads a .pscene file; false when it is not there. */
 bool harness_scene_file(const char *path, uint8_t id[PEN_ID_BYTES]);
 

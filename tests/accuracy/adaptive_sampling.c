@@ -181,6 +181,25 @@ static void check_convergence(void)
     }
 }
 
+/* Against the same maps at all 289 points: what is not split is not missed. */
+static void check_uniform(void)
+{
+    uint8_t id[PEN_ID_BYTES];
+    struct shot ours, uniform;
+    scene(PEN_GENERATED_DEMO, 0, 0, id);
+    harness_shot(id, METHOD "levels=4&threshold=0.3&map_size=256&width=320&height=240", &ours);
+    harness_shot(
+        id, METHOD "levels=4&min_level=4&threshold=0&map_size=256&width=320&height=240", &uniform);
+    double rmse = rmse_between(&ours, &uniform);
+    fprintf(stderr, "demo: %u maps, rmse %.5f from %u fixed points\n", ours.result.shadow_maps,
+        rmse, uniform.result.shadow_maps);
+    CHECK(uniform.result.shadow_maps == 289);
+    CHECK(ours.result.shadow_maps < 240);
+    CHECK(rmse < 0.01);
+    harness_shot_finish(&ours);
+    harness_shot_finish(&uniform);
+}
+
 /* Both ways of counting choose the same samples; maps are kept, also while the camera moves. */
 static void check_counting_and_keeping(void)
 {
@@ -241,6 +260,7 @@ int main(void)
     check_edge();
     check_thin();
     check_convergence();
+    check_uniform();
     check_counting_and_keeping();
     CHECK_DONE();
 }

@@ -77,20 +77,21 @@ static void check_exact(void)
 }
 
 /* Where all light is blocked the sum is 1, also where the pyramid does not prove it at once. The
- * published sum counts K x K points in a disk, whose number is pi K^2 / 4 only roughly. */
+ * published sum counts the points of a K x K grid in a disk: where the grid lies decides whether
+ * there are pi K^2 / 4 of them to 0.1 or to 0.2 %. */
 static void check_blocked(void)
 {
     static const struct {
         const char *settings;
-        double limit;
+        double rect, disk;
     } cases[] = {
-        {"technique=accumulation&mode=paper&kernel=64", 2e-3},
-        {"technique=accumulation&kernel=32", 1e-3},
-        {"technique=accumulation&kernel=64", 1e-3},
-        {"technique=accumulation&kernel=32&layers=2", 1e-3},
-        {"technique=backprojection&kernel=32&fill=none", 1e-3},
-        {"technique=backprojection&kernel=32&fill=join", 1e-3},
-        {"technique=bitmask&kernel=32", 1e-3},
+        {"technique=accumulation&mode=paper&kernel=64", 1e-3, 2e-3},
+        {"technique=accumulation&kernel=32", 1e-3, 1e-3},
+        {"technique=accumulation&kernel=64", 1e-3, 1e-3},
+        {"technique=accumulation&kernel=32&layers=2", 1e-3, 1e-3},
+        {"technique=backprojection&kernel=32&fill=none", 1e-3, 1e-3},
+        {"technique=backprojection&kernel=32&fill=join", 1e-3, 1e-3},
+        {"technique=bitmask&kernel=32", 1e-3, 1e-3},
     };
     for (uint32_t i = 0; i < 2 * sizeof cases / sizeof *cases; i++) {
         bool disk = i & 1;
@@ -116,7 +117,7 @@ static void check_blocked(void)
         fprintf(stderr, "%-50s %s umbra of %u pixels: worst %.5f\n", cases[i / 2].settings,
             disk ? "disk" : "rect", pixels, worst);
         CHECK(pixels > 100);
-        CHECK(worst < cases[i / 2].limit);
+        CHECK(worst < (disk ? cases[i / 2].disk : cases[i / 2].rect));
         harness_shot_finish(&shot);
     }
 }

@@ -45,8 +45,8 @@ const struct technique technique_stochastic = {
         .citation = "S. Mehta, B. Wang, R. Ramamoorthi, Axis-aligned filtering for interactive "
                     "sampled soft shadows, ACM TOG 31(6), 2012; H. Dammertz, D. Sewtz, J. Hanika, "
                     "H. Lensch, Edge-avoiding a-trous wavelet transform, HPG 2010",
-        .artefacts = "Grain in narrow penumbrae and on small features; antialiasing frames use "
-                     "other samples and average it out.",
+        .artefacts = "Grain in narrow penumbrae and on small features, which antialiasing frames "
+                     "average out; steps of the maps where the penumbra is wider than the filter.",
         .cost_class = PEN_COST_MEDIUM,
         .textured = true,
         .struct_size = sizeof(struct stochastic),

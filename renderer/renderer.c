@@ -63,6 +63,7 @@ struct pen_renderer *pen_renderer_create(
         return NULL;
     }
     r->budget = config->gpu_memory_bytes ? config->gpu_memory_bytes : 1ull << 30;
+    r->ctx.gpu_memory = r->budget;
     r->ctx.shadow_memory = r->budget / 2;
     r->ctx.programs = gl_programs_create();
     r->ctx.shadows = shadow_cache_create();

@@ -9,6 +9,7 @@
 #define TRACE_MAX_BLOCKS 16
 #define TRACE_PRETEST_NET 16u
 #define TRACE_PRETEST_RIM 4u
+#define TRACE_DILATION 4u /* of what the pre-test finds mixed, receivers */
 
 /* Sample points as signed 32-bit fractions of [-1,1]. Points 2k and 2k + 1 share a stratum. */
 struct trace_block {

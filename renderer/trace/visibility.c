@@ -6,7 +6,6 @@
 
 #define TILE 16 /* receivers along an edge; a multiple of 4 */
 #define TILE_RECEIVERS (TILE * TILE)
-#define DEFAULT_DILATION 4u
 
 enum verdict { NO_RECEIVER, UMBRA, LIT, MIXED };
 
@@ -266,7 +265,7 @@ static bool is_edge(uint8_t a, uint8_t b)
 static bool dilate(struct run *run)
 {
     uint32_t w = run->job->width, h = run->job->height;
-    uint32_t radius = run->job->dilation ? run->job->dilation : DEFAULT_DILATION;
+    uint32_t radius = run->job->dilation ? run->job->dilation : TRACE_DILATION;
     uint8_t *rows = calloc((size_t)w * h, 1);
     if (!rows)
         return false;

@@ -112,12 +112,16 @@ static void fill_triangle(
 }
 
 /* The number of each instance's first record; returns how many there are. */
-static uint32_t number_records(const struct psc_scene *scene, uint32_t *first)
+static uint32_t number_records(
+    const struct psc_scene *scene, const struct pen_bvh *bvh, uint32_t *first)
 {
     uint32_t count = 0;
+    for (uint32_t i = 0; i < bvh->triangle_count; i++)
+        first[bvh->triangles[i].instance] |= bvh->triangles[i].flags & PEN_BVH_ALPHA;
     for (uint32_t i = 0; i < scene->instance_count; i++) {
+        bool alpha = first[i] != 0; /* of one triangle, hence of all */
         first[i] = count;
-        if (material_of(scene, i)->alpha_mode != PSC_OPAQUE)
+        if (alpha)
             count += scene->primitives[scene->instances[i].primitive].index_count / 3;
     }
     return count;
@@ -130,7 +134,7 @@ bool ray_alpha_make(const struct psc_scene *scene, struct pen_bvh *bvh, uint64_t
     uint32_t *first = calloc(scene->instance_count + 1, sizeof *first);
     if (!first)
         return pen_fail(error, PEN_INTERNAL, "", "Out of memory.");
-    alpha->triangle_count = number_records(scene, first);
+    alpha->triangle_count = number_records(scene, bvh, first);
     uint64_t bytes = (uint64_t)alpha->triangle_count * sizeof *alpha->triangles;
     bool ok = bytes <= max_bytes ||
               pen_fail(error, PEN_TOO_LARGE, "/scene",

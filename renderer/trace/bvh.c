@@ -1,5 +1,6 @@
 /* Building and walking the hierarchy. */
 #include "renderer/trace/bvh.h"
+#include "renderer/trace/casters.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -241,7 +242,7 @@ void pen_bvh_finish(struct pen_bvh *bvh)
 
 /* One world-space triangle of an instance. */
 static struct pen_bvh_triangle make_triangle(
-    const struct psc_scene *scene, uint32_t number, uint32_t first_index)
+    const struct psc_scene *scene, uint32_t number, uint32_t first_index, bool alpha)
 {
     const struct psc_instance *instance = &scene->instances[number];
     const struct psc_material *material =
@@ -263,31 +264,50 @@ static struct pen_bvh_triangle make_triangle(
     }
     t.flags = (swapped ? PEN_BVH_SWAPPED : 0u) |
               (material->flags & PSC_DOUBLE_SIDED ? PEN_BVH_TWO_SIDED : 0u) |
-              (material->alpha_mode != PSC_OPAQUE ? PEN_BVH_ALPHA : 0u);
+              (alpha ? PEN_BVH_ALPHA : 0u);
     return t;
+}
+
+/* All triangles of the instances that cast; `count` of them. NULL when memory is short. */
+static struct pen_bvh_triangle *gather_triangles(
+    const struct psc_scene *scene, const uint8_t *casters, uint64_t count)
+{
+    struct pen_bvh_triangle *triangles = malloc((count + 1) * sizeof *triangles);
+    uint64_t next = 0;
+    for (uint32_t i = 0; triangles && i < scene->instance_count; i++) {
+        uint32_t number = scene->instances[i].primitive;
+        const struct psc_primitive *p = &scene->primitives[number];
+        bool alpha = casters[number] == TRACE_CASTS_BY_ALPHA;
+        for (uint32_t k = 0; casters[number] != TRACE_CASTS_NOTHING && k + 2 < p->index_count;
+             k += 3)
+            triangles[next++] = make_triangle(scene, i, p->first_index + k, alpha);
+    }
+    return triangles;
 }
 
 bool pen_bvh_build_scene(const struct psc_scene *scene, uint64_t max_triangles, struct pen_bvh *bvh,
     struct pen_error *error)
 {
     uint64_t count = 0, limit = max_triangles ? max_triangles : 1u << 26;
+    uint8_t *casters = trace_casters(scene);
     *bvh = (struct pen_bvh){0};
-    for (uint32_t i = 0; i < scene->instance_count; i++)
-        count += scene->primitives[scene->instances[i].primitive].index_count / 3;
-    if (count > limit)
+    if (!casters)
+        return pen_fail(error, PEN_INTERNAL, "", "Out of memory.");
+    for (uint32_t i = 0; i < scene->instance_count; i++) {
+        uint32_t number = scene->instances[i].primitive;
+        if (casters[number] != TRACE_CASTS_NOTHING)
+            count += scene->primitives[number].index_count / 3;
+    }
+    bool fits = count <= limit;
+    struct pen_bvh_triangle *triangles = fits ? gather_triangles(scene, casters, count) : NULL;
+    free(casters);
+    if (!fits)
         return pen_fail(error, PEN_TOO_LARGE, "/scene",
             "The scene has %llu triangles; %llu can be ray traced.", (unsigned long long)count,
             (unsigned long long)limit);
-    struct pen_bvh_triangle *triangles = malloc((count + 1) * sizeof *triangles);
     if (!triangles)
         return pen_fail(error, PEN_INTERNAL, "", "Out of memory.");
-    uint32_t next = 0;
-    for (uint32_t i = 0; i < scene->instance_count; i++) {
-        const struct psc_primitive *p = &scene->primitives[scene->instances[i].primitive];
-        for (uint32_t k = 0; k + 2 < p->index_count; k += 3)
-            triangles[next++] = make_triangle(scene, i, p->first_index + k);
-    }
-    bool ok = pen_bvh_build(triangles, next, bvh, error);
+    bool ok = pen_bvh_build(triangles, (uint32_t)count, bvh, error);
     free(triangles);
     return ok;
 }

@@ -31,7 +31,6 @@ struct trace_alpha_material {
     const uint8_t *texels; /* alpha of the finest level; NULL: 1 */
     uint32_t width, height, wrap_s, wrap_t;
     bool nearest, blend, two_sided, prepared;
-    uint8_t texel_low, texel_high;
     float factor, cutoff;
 };
 

@@ -23,7 +23,7 @@ layout(std430, binding = 1) readonly buffer BvhTriangles {
     BvhTriangle bvh_triangles[];
 };
 
-const uint BVH_TWO_SIDED = 1u, BVH_ALPHA = 2u;
+const uint BVH_TWO_SIDED = 1u, BVH_ALPHA = 2u, BVH_LEAF = 4u; // triangles at most
 const int BVH_STACK = 32;
 const float BVH_MISS = 3e38;
 
@@ -70,7 +70,7 @@ bool bvh_occluded(vec3 origin, vec3 direction, float limit, uint nodes)
     for (uint steps = 0u; steps < nodes; steps++) {
         uint first = bvh_nodes[at].first, count = bvh_nodes[at].count;
         bool inner = count == 0u;
-        for (uint i = 0u; i < count; i++)
+        for (uint i = 0u; i < min(count, BVH_LEAF); i++)
             if (bvh_hits(first + i, origin, direction, limit))
                 return true;
         float left = BVH_MISS, right = BVH_MISS;

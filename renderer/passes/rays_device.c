@@ -11,7 +11,8 @@
 #define GROUP 64u                    /* and of the one over the list */
 #define RAYS_PER_DISPATCH (1u << 21) /* milliseconds on a GPU */
 #define RECEIVERS_PER_DISPATCH (1u << 17)
-#define STATE_BYTES 32u /* struct RaySums */
+#define POINTS_PER_DISPATCH (1u << 12) /* one invocation takes them one after the other */
+#define STATE_BYTES 32u                /* struct RaySums */
 
 enum { BUFFER_POINTS = 2, BUFFER_STATE, BUFFER_LIST, BUFFER_COUNTERS };
 enum { IMAGE_VISIBILITY, IMAGE_ERROR, IMAGE_MARKS };
@@ -35,7 +36,7 @@ struct work {
     const struct ray_scene *scene;
     struct pen_trace_light light;
     struct trace_points points;
-    uint32_t samples;
+    uint32_t samples, listed;
     bool pretest;
     char defines[512];
 };
@@ -170,7 +171,7 @@ static void bind(const struct work *w)
 }
 
 /* A few rays for all, in bands of rows. */
-static bool pretest(const struct work *w, struct pen_error *error)
+static bool pretest(struct work *w, struct pen_error *error)
 {
     uint32_t height = w->run->height, columns = groups(w->run->width, TILE);
     uint32_t row_rays = columns * TILE * TILE * (TRACE_PRETEST_NET + TRACE_PRETEST_RIM);
@@ -193,14 +194,14 @@ static bool pretest(const struct work *w, struct pen_error *error)
 }
 
 /* Lists who gets all samples; settles the others. */
-static bool select_receivers(const struct work *w, uint32_t *count, struct pen_error *error)
+static bool select_receivers(struct work *w, struct pen_error *error)
 {
     struct ray_counters counters;
     if (!program(w, "ray_select.comp", error))
         return false;
     dispatch(groups(w->run->width, TILE), groups(w->run->height, TILE));
     gl.GetNamedBufferSubData(w->targets->counters, 0, sizeof counters, &counters);
-    *count = counters.list_count;
+    w->listed = counters.list_count;
     return true;
 }
 
@@ -210,7 +211,7 @@ static void sample_range(
 {
     const struct trace_points *p = &w->points;
     uint32_t step = 2, point = 0;
-    while (step * 2 <= RAYS_PER_DISPATCH / count)
+    while (step < POINTS_PER_DISPATCH && step * 2 <= RAYS_PER_DISPATCH / count)
         step *= 2;
     for (uint32_t b = 0; b < p->block_count; b++) {
         uint32_t end = point + p->blocks[b].count;
@@ -225,14 +226,14 @@ static void sample_range(
     }
 }
 
-static bool sample(const struct work *w, uint32_t count, struct pen_error *error)
+static bool sample(struct work *w, struct pen_error *error)
 {
     GLuint name = program(w, "ray_samples.comp", error);
     if (!name)
         return false;
     GLint range = gl.GetUniformLocation(name, "range"), ends = gl.GetUniformLocation(name, "ends");
-    for (uint32_t first = 0; first < count; first += RECEIVERS_PER_DISPATCH) {
-        uint32_t left = count - first;
+    for (uint32_t first = 0; first < w->listed; first += RECEIVERS_PER_DISPATCH) {
+        uint32_t left = w->listed - first;
         sample_range(w, name, first, left < RECEIVERS_PER_DISPATCH ? left : RECEIVERS_PER_DISPATCH,
             range, ends);
     }
@@ -254,33 +255,23 @@ static void unbind(void)
     gl.BindSampler(UNIT_EMISSION, 0);
 }
 
-/* One timed step. */
-static bool timed(const struct work *w, const char *name,
-    bool (*step)(const struct work *, uint32_t *, struct pen_error *), uint32_t *count,
-    struct pen_error *error)
+static const struct step {
+    const char *name;
+    bool (*run)(struct work *, struct pen_error *);
+} steps[] = {{"ray pre-test", pretest}, {"ray select", select_receivers}, {"ray samples", sample}};
+
+static bool run_step(struct work *w, const struct step *step, struct pen_error *error)
 {
-    gl_timer_begin(&w->run->ctx->timer, PEN_STAGE_TECHNIQUE, name);
-    bool ok = step(w, count, error);
+    gl_timer_begin(&w->run->ctx->timer, PEN_STAGE_TECHNIQUE, step->name);
+    bool ok = step->run(w, error);
     gl_timer_end(&w->run->ctx->timer);
     return ok;
-}
-
-static bool pretest_step(const struct work *w, uint32_t *count, struct pen_error *error)
-{
-    (void)count;
-    return pretest(w, error);
-}
-
-static bool sample_step(const struct work *w, uint32_t *count, struct pen_error *error)
-{
-    return sample(w, *count, error);
 }
 
 bool pass_rays_device(struct technique_run *run, const struct ray_job *job,
     struct ray_targets *targets, struct pen_error *error)
 {
     struct work w = {.run = run, .job = job, .targets = targets, .light = ray_light(run)};
-    uint32_t count = 0;
     w.scene = ray_scene_get(run, error);
     if (!w.scene || !ray_receivers(run, targets, error))
         return false;
@@ -290,9 +281,8 @@ bool pass_rays_device(struct technique_run *run, const struct ray_job *job,
     bool ok = prepare(&w, error);
     if (ok) {
         bind(&w);
-        ok = (!w.pretest || timed(&w, "ray pre-test", pretest_step, &count, error)) &&
-             timed(&w, "ray select", select_receivers, &count, error) &&
-             timed(&w, "ray samples", sample_step, &count, error);
+        for (size_t i = w.pretest ? 0 : 1; ok && i < sizeof steps / sizeof *steps; i++)
+            ok = run_step(&w, &steps[i], error);
         unbind();
     }
     if (ok)

@@ -3,6 +3,7 @@
 #include "renderer/passes/ray_scene.h"
 #include "renderer/passes/rays.h"
 #include "renderer/trace/points.h"
+#include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -12,7 +13,8 @@
 #define RAYS_PER_DISPATCH (1u << 21) /* milliseconds on a GPU */
 #define RECEIVERS_PER_DISPATCH (1u << 17)
 #define POINTS_PER_DISPATCH (1u << 12) /* one invocation takes them one after the other */
-#define STATE_BYTES 32u                /* struct RaySums */
+#define POINTS_ON_SOFTWARE 16u /* leaves 4096 turns of llvmpipe's loops for a ray: ray_bvh.glsl */
+#define STATE_BYTES 32u        /* struct RaySums */
 
 enum { BUFFER_POINTS = 2, BUFFER_STATE, BUFFER_LIST, BUFFER_COUNTERS };
 enum { IMAGE_VISIBILITY, IMAGE_ERROR, IMAGE_MARKS };
@@ -26,7 +28,7 @@ struct ray_block {
 
 /* As RayCounters. */
 struct ray_counters {
-    uint32_t rays_low, rays_high, full_pixels, list_count;
+    uint32_t rays_low, rays_high, full_pixels, list_count, cut;
 };
 
 struct work {
@@ -193,25 +195,32 @@ static bool pretest(struct work *w, struct pen_error *error)
     return true;
 }
 
+static struct ray_counters read_counters(const struct work *w)
+{
+    struct ray_counters counters;
+    gl.GetNamedBufferSubData(w->targets->counters, 0, sizeof counters, &counters);
+    return counters;
+}
+
 /* Lists who gets all samples; settles the others. */
 static bool select_receivers(struct work *w, struct pen_error *error)
 {
-    struct ray_counters counters;
     if (!program(w, "ray_select.comp", error))
         return false;
     dispatch(groups(w->run->width, TILE), groups(w->run->height, TILE));
-    gl.GetNamedBufferSubData(w->targets->counters, 0, sizeof counters, &counters);
-    w->listed = counters.list_count;
+    w->listed = read_counters(w).list_count;
     return true;
 }
 
-/* All samples of `count` listed receivers from `first`, slice by slice. Slices hold whole pairs. */
-static void sample_range(
-    const struct work *w, GLuint name, uint32_t first, uint32_t count, GLint range, GLint ends)
+/* All samples of the listed receivers from `first`, slice by slice of at most `most` points. Slices
+ * hold whole pairs. */
+static void sample_range(const struct work *w, GLuint name, uint32_t first, uint32_t most)
 {
     const struct trace_points *p = &w->points;
-    uint32_t step = 2, point = 0;
-    while (step < POINTS_PER_DISPATCH && step * 2 <= RAYS_PER_DISPATCH / count)
+    GLint range = gl.GetUniformLocation(name, "range"), ends = gl.GetUniformLocation(name, "ends");
+    uint32_t left = w->listed - first, step = 2, point = 0;
+    uint32_t count = left < RECEIVERS_PER_DISPATCH ? left : RECEIVERS_PER_DISPATCH;
+    while (step * 2 <= most && step * 2 <= RAYS_PER_DISPATCH / count)
         step *= 2;
     for (uint32_t b = 0; b < p->block_count; b++) {
         uint32_t end = point + p->blocks[b].count;
@@ -231,19 +240,23 @@ static bool sample(struct work *w, struct pen_error *error)
     GLuint name = program(w, "ray_samples.comp", error);
     if (!name)
         return false;
-    GLint range = gl.GetUniformLocation(name, "range"), ends = gl.GetUniformLocation(name, "ends");
-    for (uint32_t first = 0; first < w->listed; first += RECEIVERS_PER_DISPATCH) {
-        uint32_t left = w->listed - first;
-        sample_range(w, name, first, left < RECEIVERS_PER_DISPATCH ? left : RECEIVERS_PER_DISPATCH,
-            range, ends);
+    uint32_t most = w->run->ctx->device.software ? POINTS_ON_SOFTWARE : POINTS_PER_DISPATCH;
+    for (; most >= 2; most /= 2) {
+        static const uint32_t zero;
+        gl.NamedBufferSubData(
+            w->targets->counters, offsetof(struct ray_counters, cut), sizeof zero, &zero);
+        for (uint32_t first = 0; first < w->listed; first += RECEIVERS_PER_DISPATCH)
+            sample_range(w, name, first, most);
+        if (!read_counters(w).cut)
+            return true;
     }
-    return true;
+    return pen_fail(
+        error, PEN_TOO_LARGE, "/scene", "This device cuts short what it takes to trace the scene.");
 }
 
 static void add_counts(const struct work *w)
 {
-    struct ray_counters counters;
-    gl.GetNamedBufferSubData(w->targets->counters, 0, sizeof counters, &counters);
+    struct ray_counters counters = read_counters(w);
     w->run->result->rays += (uint64_t)counters.rays_high << 32 | counters.rays_low;
     w->run->result->full_work_pixels += counters.full_pixels;
 }

@@ -57,8 +57,11 @@ bool bvh_hits(uint triangle, vec3 origin, vec3 direction, float limit)
     return true;
 }
 
+bool bvh_cut = false; // some walk was not finished: its answer means nothing
+
 // `nodes`: how many there are, 0 for an empty scene. A walk visits none twice, so that is the most
-// steps that it may take, whatever the buffers hold.
+// steps that it may take, whatever the buffers hold. A driver may allow fewer: llvmpipe leaves all
+// loops of an invocation when they have turned 65535 times together.
 bool bvh_occluded(vec3 origin, vec3 direction, float limit, uint nodes)
 {
     uint stack[BVH_STACK], at = 0u;
@@ -89,5 +92,6 @@ bool bvh_occluded(vec3 origin, vec3 direction, float limit, uint nodes)
             return false;
         at = stack[--waiting];
     }
+    bvh_cut = true;
     return false;
 }

@@ -18,8 +18,8 @@ layout(std430, binding = 4) buffer RayList {
     uint list[]; // pixel y * width + x, with LIST_LIT where no ray is needed
 };
 layout(std430, binding = 5) buffer RayCounters {
-    uint rays_low, rays_high, full_pixels;
-    uint list_count;
+    uint rays_low, rays_high, full_pixels, list_count;
+    uint cut; // 1: some sums lack samples
 } counters;
 
 const uint LIST_LIT = 0x80000000u;

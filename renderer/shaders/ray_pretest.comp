@@ -20,7 +20,10 @@ void main()
                 seen += is_visible(r, direction_to(r, s), ray.pretest.z + i) ? 1u : 0u;
             }
         }
-        verdict = seen == PRETEST_NET + PRETEST_RIM ? LIT : seen == 0u ? UMBRA : MIXED;
+        verdict = bvh_cut                         ? MIXED
+            : seen == PRETEST_NET + PRETEST_RIM ? LIT
+            : seen == 0u                        ? UMBRA
+                                                : MIXED;
         count_rays(rays);
     }
     imageStore(verdicts, pixel, uvec4(verdict));

@@ -49,7 +49,7 @@ void take_samples(RayReceiver r, bool traced, inout RaySums sums)
 {
     float last_weight = 0.0;
     bool last_seen = false;
-    uint rays = 0u;
+    uint rays = 0u, taken = 0u;
     for (uint i = range.z; i < range.z + range.w; i++) {
         vec2 s = light_point(points[i] ^ r.shift);
         vec3 direction = direction_to(r, s);
@@ -79,7 +79,10 @@ void take_samples(RayReceiver r, bool traced, inout RaySums sums)
             float mean = 0.5 * (weight + last_weight);
             sums.pairs += mean * mean;
         }
+        taken++;
     }
+    if (bvh_cut || taken < range.w)
+        counters.cut = 1u;
     count_rays(rays);
 }
 

@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #define SMALL "&width=96&height=72"
+#define TINY "&width=32&height=24"
 #define DOWN                                                                                       \
     "&width=96&height=96&ground=off&camera.eye=0,1,0&camera.target=0,0,0&camera.up=0,0,-1"         \
     "&camera.fov_y_deg=90"
@@ -165,25 +166,28 @@ static struct compared compare(const struct shot *a, const struct shot *b, doubl
     return c;
 }
 
-static void check_backends(const char *name, const uint8_t *id, const char *settings)
+/* Returns the rays of the GPU. */
+static uint64_t check_backends(
+    const char *name, const uint8_t *id, const char *settings, uint32_t samples)
 {
-    enum { SAMPLES = 32 };
     struct shot cpu, gpu;
-    render(id, "cpu", SAMPLES, settings, &cpu);
-    render(id, "gpu", SAMPLES, settings, &gpu);
-    struct compared c = compare(&cpu, &gpu, 1.0 / SAMPLES);
-    int64_t rays = (int64_t)(gpu.result.rays - cpu.result.rays);
+    render(id, "cpu", samples, settings, &cpu);
+    render(id, "gpu", samples, settings, &gpu);
+    struct compared c = compare(&cpu, &gpu, 1.0 / samples);
+    uint64_t rays = gpu.result.rays;
+    int64_t more = (int64_t)(rays - cpu.result.rays);
     fprintf(stderr, "%-28s rmse %.5f, %u of %u differ; rays %llu %+lld, full %u %+d\n", name,
-        c.rmse, c.other, c.pixels, (unsigned long long)cpu.result.rays, (long long)rays,
+        c.rmse, c.other, c.pixels, (unsigned long long)cpu.result.rays, (long long)more,
         cpu.result.full_work_pixels,
         (int)(gpu.result.full_work_pixels - cpu.result.full_work_pixels));
     /* A ray that grazes an edge may be decided either way by rounding; a sample has one ray. */
-    CHECK(c.rmse < 0.05 / SAMPLES && c.other * 1000 <= c.pixels);
-    CHECK(llabs(rays) * 1000 <= (int64_t)cpu.result.rays);
+    CHECK(c.rmse < 0.05 / samples && c.other * 1000 <= c.pixels);
+    CHECK(llabs(more) * 1000 <= (int64_t)rays);
     CHECK(ran(&cpu, "trace") && !ran(&cpu, "ray samples"));
     CHECK(ran(&gpu, "ray samples") && !ran(&gpu, "trace"));
     harness_shot_finish(&cpu);
     harness_shot_finish(&gpu);
+    return rays;
 }
 
 static void add_sheet(struct psc_builder *b, const struct psc_material *material, float x, float z,
@@ -259,16 +263,20 @@ int main(void)
     check_closed_forms();
     harness_scene(&(struct pen_generated_options){.kind = PEN_GENERATED_DEMO}, demo);
     sheets(alpha);
-    check_backends("demo", demo, SMALL);
-    check_backends("demo, every pixel", demo, SMALL "&adaptive=false");
-    check_backends("demo, g", demo, SMALL "&weighting=g");
-    check_backends("demo, sphere", demo, SMALL SPHERE);
-    check_backends("demo, sun", demo, SMALL SUN);
-    check_backends("demo, point", demo, SMALL POINT);
-    check_backends("demo, spot", demo, SMALL SPOT);
-    check_backends("demo, disk", demo, SMALL HARNESS_DISK);
-    check_backends("demo, textured", demo, SMALL TEXTURED);
-    check_backends("demo, textured g", demo, SMALL TEXTURED "&weighting=g");
-    check_backends("sheets", alpha, DOWN HARNESS_RECT);
+    check_backends("demo", demo, SMALL, 32);
+    check_backends("demo, every pixel", demo, SMALL "&adaptive=false", 32);
+    check_backends("demo, g", demo, SMALL "&weighting=g", 32);
+    check_backends("demo, sphere", demo, SMALL SPHERE, 32);
+    check_backends("demo, sun", demo, SMALL SUN, 32);
+    check_backends("demo, point", demo, SMALL POINT, 32);
+    check_backends("demo, spot", demo, SMALL SPOT, 32);
+    check_backends("demo, disk", demo, SMALL HARNESS_DISK, 32);
+    check_backends("demo, textured", demo, SMALL TEXTURED, 32);
+    check_backends("demo, textured g", demo, SMALL TEXTURED "&weighting=g", 32);
+    check_backends("sheets", alpha, DOWN HARNESS_RECT, 32);
+    /* Receivers may stop after 256, 512, ... samples. */
+    uint64_t all = check_backends("demo, 1024 samples", demo, TINY, 1024);
+    uint64_t some = check_backends("demo, error 0.02", demo, TINY "&target_error=0.02", 1024);
+    CHECK(some < all / 2);
     CHECK_DONE();
 }

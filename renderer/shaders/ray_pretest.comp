@@ -10,20 +10,19 @@ void main()
     if (any(greaterThanEqual(pixel, ivec2(ray.size.xy))))
         return;
     RayReceiver r;
-    uint verdict = NO_RECEIVER, seen = 0u, rays = 0u;
+    uint verdict = NO_RECEIVER, seen = 0u, rays = 0u, taken = 0u;
     if (load_receiver(pixel, ray.pretest, r)) {
-        for (uint i = 0u; r.reachable && i < PRETEST_NET + PRETEST_RIM; i++) {
-            ivec2 shift = i < PRETEST_NET ? r.shift : ivec2(0);
-            vec2 s = light_point(points[ray.net.w + i] ^ shift);
+        for (; r.reachable && taken < PRETEST_NET + PRETEST_RIM; taken++) {
+            ivec2 shift = taken < PRETEST_NET ? r.shift : ivec2(0);
+            vec2 s = light_point(points[ray.net.w + taken] ^ shift);
             if (cosine_to(r, s) > 0.0) {
                 rays++;
-                seen += is_visible(r, direction_to(r, s), ray.pretest.z + i) ? 1u : 0u;
+                seen += is_visible(r, direction_to(r, s), ray.pretest.z + taken) ? 1u : 0u;
             }
         }
-        verdict = bvh_cut                         ? MIXED
-            : seen == PRETEST_NET + PRETEST_RIM ? LIT
-            : seen == 0u                        ? UMBRA
-                                                : MIXED;
+        bool cut = bvh_cut || (r.reachable && taken < PRETEST_NET + PRETEST_RIM);
+        bool all_seen = seen == PRETEST_NET + PRETEST_RIM;
+        verdict = cut || (seen > 0u && !all_seen) ? MIXED : all_seen ? LIT : UMBRA;
         count_rays(rays);
     }
     imageStore(verdicts, pixel, uvec4(verdict));

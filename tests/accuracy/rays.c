@@ -8,6 +8,9 @@
 
 #define SMALL "&width=96&height=72"
 #define TINY "&width=32&height=24"
+#define TINY_DOWN                                                                                  \
+    "&width=32&height=32&ground=off&camera.eye=0,1,0&camera.target=0,0,0&camera.up=0,0,-1"         \
+    "&camera.fov_y_deg=90"
 #define DOWN                                                                                       \
     "&width=96&height=96&ground=off&camera.eye=0,1,0&camera.target=0,0,0&camera.up=0,0,-1"         \
     "&camera.fov_y_deg=90"
@@ -125,6 +128,26 @@ static void check_mask(void)
     free(data);
 }
 
+/* T7: what nothing shadows is lit exactly. */
+static void check_lit(void)
+{
+    static const char *const lights[] = {
+        HARNESS_RECT, HARNESS_DISK, SUN, SPHERE, POINT, SPOT, TEXTURED "&weighting=g"};
+    uint8_t id[PEN_ID_BYTES];
+    harness_scene(&(struct pen_generated_options){.kind = PEN_GENERATED_PLANE}, id);
+    for (size_t i = 0; i < sizeof lights / sizeof *lights; i++) {
+        char settings[512];
+        struct shot shot;
+        snprintf(settings, sizeof settings, TINY_DOWN "%s", lights[i]);
+        render(id, "gpu", 32, settings, &shot);
+        struct deviation d = harness_deviation(&shot, truth_one, NULL);
+        if (d.worst > 0)
+            fprintf(stderr, "T7%s: worst %.6f\n", lights[i], d.worst);
+        CHECK(d.worst == 0 && d.pixels > 500);
+        harness_shot_finish(&shot);
+    }
+}
+
 static void check_closed_forms(void)
 {
     uint8_t half[PEN_ID_BYTES], square[PEN_ID_BYTES], stacked[PEN_ID_BYTES];
@@ -138,6 +161,7 @@ static void check_closed_forms(void)
     struct planar_case lower = {0.6, 3, 0.5, 0};
     check_truth("T4", stacked, BELOW HARNESS_RECT, truth_stacked, &lower);
     check_mask();
+    check_lit();
     struct shot shot;
     double worst;
     render(half, "gpu", 64, DOWN TEXTURED, &shot);

@@ -24,14 +24,25 @@ struct split {
     float low, scale, cost;
 };
 
+/* Where no NaN can be: fminf and fmaxf are calls into the mathematics library. */
+static inline float lesser(float a, float b)
+{
+    return a < b ? a : b;
+}
+
+static inline float greater(float a, float b)
+{
+    return a > b ? a : b;
+}
+
 static const struct box empty_box = {
     {INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
 
 static void grow(struct box *box, const struct box *by)
 {
     for (int c = 0; c < 3; c++) {
-        box->low[c] = fminf(box->low[c], by->low[c]);
-        box->high[c] = fmaxf(box->high[c], by->high[c]);
+        box->low[c] = lesser(box->low[c], by->low[c]);
+        box->high[c] = greater(box->high[c], by->high[c]);
     }
 }
 
@@ -39,7 +50,7 @@ static float half_area(const struct box *box)
 {
     float d[3];
     for (int c = 0; c < 3; c++)
-        d[c] = fmaxf(box->high[c] - box->low[c], 0);
+        d[c] = greater(box->high[c] - box->low[c], 0);
     return d[0] * d[1] + d[1] * d[2] + d[2] * d[0];
 }
 
@@ -51,7 +62,7 @@ static float middle(const struct item *item, int axis)
 static uint32_t bin_of(const struct split *split, const struct item *item)
 {
     float at = (middle(item, split->axis) - split->low) * split->scale;
-    return at < BINS - 1 ? (uint32_t)fmaxf(at, 0) : BINS - 1;
+    return at < BINS - 1 ? (uint32_t)greater(at, 0) : BINS - 1;
 }
 
 /* The cheapest plane between two bins of one axis. */
@@ -130,8 +141,8 @@ static uint32_t divide(struct item *items, uint32_t count, float area, uint32_t 
     struct box centres = empty_box;
     for (uint32_t i = 0; i < count; i++)
         for (int c = 0; c < 3; c++) {
-            centres.low[c] = fminf(centres.low[c], middle(&items[i], c));
-            centres.high[c] = fmaxf(centres.high[c], middle(&items[i], c));
+            centres.low[c] = lesser(centres.low[c], middle(&items[i], c));
+            centres.high[c] = greater(centres.high[c], middle(&items[i], c));
         }
     for (int axis = 0; axis < 3; axis++) {
         struct split s = split_axis(items, count, axis, centres.low[axis], centres.high[axis]);
@@ -220,8 +231,8 @@ bool pen_bvh_build(const struct pen_bvh_triangle *triangles, uint32_t count, str
         items[i].triangle = i;
         for (int c = 0; c < 3; c++) {
             float a = t->corner[c], b = a + t->edge1[c], d = a + t->edge2[c];
-            box->low[c] = fminf(a, fminf(b, d));
-            box->high[c] = fmaxf(a, fmaxf(b, d));
+            box->low[c] = lesser(a, lesser(b, d));
+            box->high[c] = greater(a, greater(b, d));
         }
     }
     build_nodes(items, count, bvh);
@@ -320,8 +331,8 @@ static float enter(
     for (int c = 0; c < 3; c++) {
         float a = (node->low[c] - origin[c]) * inverse[c];
         float b = (node->high[c] - origin[c]) * inverse[c];
-        near = fmaxf(near, fminf(a, b));
-        far = fminf(far, fmaxf(a, b));
+        near = greater(near, lesser(a, b));
+        far = lesser(far, greater(a, b));
     }
     return near <= far * 1.0000005f ? near : INFINITY; /* rounding must not lose a box */
 }

@@ -92,6 +92,7 @@ void harness_shot(const uint8_t id[PEN_ID_BYTES], const char *settings, struct s
         float **to = !strcmp(frame.planes[i].name, "visibility") ? &shot->visibility
                      : !strcmp(frame.planes[i].name, "position") ? &shot->position
                      : !strcmp(frame.planes[i].name, "normal")   ? &shot->normal
+                     : !strcmp(frame.planes[i].name, "beauty")   ? &shot->beauty
                                                                  : NULL;
         if (to) {
             *to = frame.planes[i].data;
@@ -106,6 +107,7 @@ void harness_shot_finish(struct shot *shot)
     free(shot->visibility);
     free(shot->position);
     free(shot->normal);
+    free(shot->beauty);
     memset(shot, 0, sizeof *shot);
 }
 

@@ -9,6 +9,7 @@ struct shot {
     float *visibility; /* RGBA per pixel: rgb coloured, a mean visibility */
     float *position;   /* RGBA per pixel: world xyz; background: 0 */
     float *normal;     /* RGBA per pixel: world shading normal; background: 0 */
+    float *beauty;     /* RGBA per pixel: linear radiance */
     struct pen_result result;
 };
 

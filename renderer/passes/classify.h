@@ -9,8 +9,9 @@
 enum tile_class { TILE_LIT, TILE_UNDECIDED, TILE_UMBRA, TILE_EMPTY };
 
 /* Classifies run's face and writes 0 to the umbra tiles of vis. `margin_texels`: how far beyond the
- * filter windows the method may look. Adds the pixels to run->result->class_pixels. The answer is
- * valid until the next call; pass it to pass_screen as `tiles`. */
+ * filter windows the method may look. Adds the receivers to run->result->class_pixels, and the
+ * undecided ones to full_work_pixels. The answer is valid until the next call and also in
+ * run->tiles; pass it to pass_screen as `tiles`. */
 const struct gl_texture *pass_classify(struct technique_run *run,
     const struct shadow_input *casters, float margin_texels, struct pen_error *error);
 

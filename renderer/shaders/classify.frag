@@ -6,19 +6,21 @@ layout(std140, binding = 3) uniform ClassifyBlock {
     vec4 margin; // x: texels of the full map
     ivec4 tile;  // x: px
 } classify;
-layout(location = 0) out vec4 tile_class; // class / 255
+layout(location = 0) out vec4 tile_class; // class / 255, receivers / 255
 
 const float LIT = 0.0, UNDECIDED = 1.0, UMBRA = 2.0, EMPTY = 3.0;
 
-float classify_tile(ivec2 first, ivec2 size)
+float classify_tile(ivec2 first, ivec2 size, out int receivers)
 {
     ivec2 end = min(first + classify.tile.x, size);
     float low = 1e30, high = 0.0;
+    receivers = 0;
     for (int y = first.y; y < end.y; y++)
         for (int x = first.x; x < end.x; x++) {
             float d = texelFetch(g_depth, ivec2(x, y), 0).r;
             low = min(low, d == 0.0 ? low : d);
             high = max(high, d);
+            receivers += d == 0.0 ? 0 : 1;
         }
     if (high == 0.0)
         return EMPTY;
@@ -86,5 +88,7 @@ float classify_tile(ivec2 first, ivec2 size)
 void main()
 {
     ivec2 size = ivec2(view.viewport.xy);
-    tile_class = vec4(classify_tile(ivec2(gl_FragCoord.xy) * classify.tile.x, size) / 255.0);
+    int receivers;
+    float found = classify_tile(ivec2(gl_FragCoord.xy) * classify.tile.x, size, receivers);
+    tile_class = vec4(found, float(receivers), 0.0, 0.0) / 255.0;
 }

@@ -40,7 +40,8 @@ bool pass_fill_umbra(struct technique_run *run, const struct gl_texture *tiles, 
 }
 
 static const struct gl_texture *classify(struct technique_run *run,
-    const struct shadow_input *casters, float margin_texels, bool umbra, struct pen_error *error)
+    const struct shadow_input *casters, float margin_texels, float margin_pixels, bool umbra,
+    struct pen_error *error)
 {
     struct technique_ctx *ctx = run->ctx;
     struct gl_texture *tiles = &ctx->tiles;
@@ -53,8 +54,8 @@ static const struct gl_texture *classify(struct technique_run *run,
     }
     /* Spheres' far sides and textured lights need no zero tiles of their own: 0 is 0 in any colour;
      * but an omnidirectional light lights what lies behind its plane. */
-    struct classify_block block = {
-        .margin = {margin_texels + 1}, .tile = {CLASSIFY_TILE, umbra && !run->face->omni ? 1 : 0}};
+    struct classify_block block = {.margin = {margin_texels + 1, margin_pixels},
+        .tile = {CLASSIFY_TILE, umbra && !run->face->omni ? 1 : 0}};
     struct pass_texture textures[] = {{UNIT_DEPTH, run->gbuffer->depth.name, GL_SAMPLE_NEAREST},
         {UNIT_MIN_MAX, casters->textures[0].name, GL_SAMPLE_NEAREST}};
     if (!pass_fill(ctx,
@@ -80,11 +81,23 @@ static const struct gl_texture *classify(struct technique_run *run,
 const struct gl_texture *pass_classify(struct technique_run *run,
     const struct shadow_input *casters, float margin_texels, struct pen_error *error)
 {
-    return classify(run, casters, margin_texels, true, error);
+    return classify(run, casters, margin_texels, 0, true, error);
 }
 
 const struct gl_texture *pass_classify_lit(struct technique_run *run,
     const struct shadow_input *casters, float margin_texels, struct pen_error *error)
 {
-    return classify(run, casters, margin_texels, false, error);
+    return classify(run, casters, margin_texels, 0, false, error);
+}
+
+bool pass_lit_tiles(struct technique_run *run, uint32_t map_size, float margin_texels,
+    float margin_pixels, const struct gl_texture **tiles, struct pen_error *error)
+{
+    *tiles = NULL;
+    if (!run->request->classify.on)
+        return true;
+    const struct shadow_input *casters = pass_caster_min_max(run, map_size, error);
+    if (casters)
+        *tiles = classify(run, casters, margin_texels, margin_pixels, false, error);
+    return *tiles != NULL;
 }

@@ -20,6 +20,13 @@ const struct gl_texture *pass_classify(struct technique_run *run,
 const struct gl_texture *pass_classify_lit(struct technique_run *run,
     const struct shadow_input *casters, float margin_texels, struct pen_error *error);
 
+/* The same for methods that filter depths, not comparisons. What they leave of the light behind
+ * casters is no certain 0; but where nothing in the window is nearer than the receivers, its mean
+ * is not either, and all of them answer 1. `margin_pixels`: what is added to margin_texels, in
+ * pixels of the image, head-on. *tiles is NULL when the request wants every pixel. */
+bool pass_lit_tiles(struct technique_run *run, uint32_t map_size, float margin_texels,
+    float margin_pixels, const struct gl_texture **tiles, struct pen_error *error);
+
 /* Writes 0 to the umbra tiles of another target, such as a method's scratch. */
 bool pass_fill_umbra(struct technique_run *run, const struct gl_texture *tiles, GLuint framebuffer,
     struct pen_error *error);

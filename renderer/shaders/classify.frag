@@ -3,7 +3,7 @@
 #include "surface.glsl"
 #include "min_max.glsl"
 layout(std140, binding = 3) uniform ClassifyBlock {
-    vec4 margin; // x: texels of the full map
+    vec4 margin; // x: texels of the full map, y: pixels of the image
     ivec4 tile;  // x: px
 } classify;
 layout(location = 0) out vec4 tile_class; // class / 255, receivers / 255
@@ -45,6 +45,8 @@ float classify_tile(ivec2 first, ivec2 size, out int receivers)
         return UNDECIDED;
     vec2 texel = (light.rect.zw - light.rect.xy) / vec2(2 * textureSize(min_max_pyramid, 0));
     vec2 center = 0.5 * (q_low + q_high), spread = 0.5 * (q_high - q_low) + classify.margin.x * texel;
+    float pixel = view.forward.w / (low * view.eye.w); // m, of the farthest receiver
+    spread += classify.margin.y * pixel * (light.parallel != 0 ? 1.0 : light.near_z / near_z);
     vec2 search = light_search_extent(far_z) + spread;
     float slack = 1e-4 * far_z;
 

@@ -10,6 +10,33 @@ layout(location = 0) out vec4 tile_class; // class / 255, receivers / 255
 
 const float LIT = 0.0, UNDECIDED = 1.0, UMBRA = 2.0, EMPTY = 3.0;
 
+// Whether all of the emitter is above the horizon of every receiver of the tile. What turns away from
+// it may be thin or leave no depth in the map, and still sees nothing of the light. `low`, `high`:
+// bounds of the receivers.
+bool all_face_light(ivec2 first, ivec2 end, vec3 low, vec3 high)
+{
+    // Most such tiles are flat: one normal, at the worst corner of the bounds.
+    vec2 least = vec2(2.0), most = vec2(-1.0);
+    for (int y = first.y; y < end.y; y++)
+        for (int x = first.x; x < end.x; x++) {
+            vec2 e = texelFetch(g_normal, ivec2(x, y), 0).xy;
+            least = min(least, e);
+            most = max(most, e);
+        }
+    vec3 n = mat3(light.world_to_light) * octahedral_decode(least);
+    vec3 worst = mix(low, high, greaterThan(n, vec3(0.0)));
+    if (least == most && light_is_wholly_above_horizon(worst, n))
+        return true;
+    bool facing = true;
+    for (int y = first.y; y < end.y && facing; y++)
+        for (int x = first.x; x < end.x; x++) {
+            float d = texelFetch(g_depth, ivec2(x, y), 0).r;
+            Surface s = surface_at(ivec2(x, y), max(d, 1e-20));
+            facing = facing && (d == 0.0 || light_is_wholly_above_horizon(s.p, s.n));
+        }
+    return facing;
+}
+
 float classify_tile(ivec2 first, ivec2 size, out int receivers)
 {
     ivec2 end = min(first + classify.tile.x, size);
@@ -28,18 +55,19 @@ float classify_tile(ivec2 first, ivec2 size, out int receivers)
     vec2 ndc_low = pixel_to_ndc(first) - vec2(1.0, -1.0) * view.viewport.zw;
     vec2 ndc_high = pixel_to_ndc(end - 1) + vec2(1.0, -1.0) * view.viewport.zw;
     vec2 q_low = vec2(1e30), q_high = vec2(-1e30);
-    float near_z = 1e30, far_z = -1e30;
+    vec3 p_low = vec3(1e30), p_high = vec3(-1e30);
     for (int i = 0; i < 8; i++) {
         vec2 ndc = vec2((i & 1) != 0 ? ndc_high.x : ndc_low.x, (i & 2) != 0 ? ndc_high.y : ndc_low.y);
         vec3 p = unproject(light.clip_to_light, ndc, (i & 4) != 0 ? high : low);
-        near_z = min(near_z, p.z);
-        far_z = max(far_z, p.z);
+        p_low = min(p_low, p);
+        p_high = max(p_high, p);
         if (light.parallel == 0 && p.z <= light.near_z)
             return UNDECIDED; // beside or behind the light: nothing to project
         vec2 q = light_project(p);
         q_low = min(q_low, q);
         q_high = max(q_high, q);
     }
+    float near_z = p_low.z, far_z = p_high.z;
     // A cube face only owns receivers inside its pyramid.
     if (light.cube != 0)
         return UNDECIDED;
@@ -77,7 +105,7 @@ float classify_tile(ivec2 first, ivec2 size, out int receivers)
             }
         }
     if (!blocked)
-        return LIT;
+        return all_face_light(first, end, p_low, p_high) ? LIT : UNDECIDED;
     // In umbra every texel of every window blocks: the windows must not reach over the map's border,
     // where nothing is, and lie wholly in front of the nearest receiver.
     vec2 window = reach + spread;

@@ -6,6 +6,9 @@
 
 static const char *const weighting_names[] = {"area", "g", NULL};
 
+/* Errors of several lights must not be alike, or they would not average out. */
+#define LIGHT_SEED 0x9e3779b9u
+
 struct raytraced {
     uint32_t samples;
     uint32_t weighting;
@@ -30,8 +33,8 @@ static const struct pen_param rows[] = {
 struct state {
     struct gl_texture receivers[2]; /* world position, geometric normal */
     GLuint receivers_framebuffer;
-    struct gl_texture visibility;
-    GLuint visibility_framebuffer;
+    struct gl_texture visibility;     /* RGBA32F */
+    struct gl_texture standard_error; /* R32F, of visibility's a; only when the frame wants it */
 };
 
 static void destroy(struct technique_ctx *ctx, void *state)
@@ -41,6 +44,7 @@ static void destroy(struct technique_ctx *ctx, void *state)
     gl_texture_destroy(&s->receivers[0]);
     gl_texture_destroy(&s->receivers[1]);
     gl_texture_destroy(&s->visibility);
+    gl_texture_destroy(&s->standard_error);
     gl.DeleteFramebuffers(1, &s->receivers_framebuffer);
 }
 
@@ -132,8 +136,8 @@ static bool trace(struct technique_run *run, struct pen_error *error)
         return false;
     size_t count = (size_t)run->width * run->height;
     float *positions = malloc(16 * count), *normals = malloc(16 * count);
-    float *visibility = malloc(16 * count);
-    if (!positions || !normals || !visibility)
+    float *visibility = malloc(16 * count), *standard_error = malloc(4 * count);
+    if (!positions || !normals || !visibility || !standard_error)
         abort();
     struct pen_trace_light light = trace_light(run->light);
     float *emission = read_emission(run, &light);
@@ -148,9 +152,11 @@ static bool trace(struct technique_run *run, struct pen_error *error)
         .weighting = params->weighting,
         .adaptive = params->adaptive.on && run->face->half[0] > 0,
         .depth_error = 0x1p-16f,
-        .seed = params->seed + run->frame};
+        .seed = params->seed + run->frame + LIGHT_SEED * run->light_index};
     memcpy(job.eye, run->view->eye, sizeof job.eye);
-    struct pen_trace_result result = {.visibility = visibility};
+    bool wants_error = run->variance_framebuffer != 0;
+    struct pen_trace_result result = {
+        .visibility = visibility, .standard_error = wants_error ? standard_error : NULL};
     struct pen_trace_stats stats;
     bool ok = read_receivers(run, positions, normals, error);
     gl_timer_begin(&run->ctx->timer, PEN_STAGE_TECHNIQUE, "trace");
@@ -160,12 +166,17 @@ static bool trace(struct technique_run *run, struct pen_error *error)
         gl_texture_fit(&s->visibility, GL_RGBA32F, run->width, run->height, 0, 1);
         gl.TextureSubImage2D(s->visibility.name, 0, 0, 0, (GLsizei)run->width, (GLsizei)run->height,
             GL_RGBA, GL_FLOAT, visibility);
+        gl_texture_fit(&s->standard_error, GL_R32F, run->width, run->height, 0, 1);
+        if (wants_error)
+            gl.TextureSubImage2D(s->standard_error.name, 0, 0, 0, (GLsizei)run->width,
+                (GLsizei)run->height, GL_RED, GL_FLOAT, standard_error);
         run->result->rays += stats.rays;
         run->result->full_work_pixels += (uint32_t)stats.full_receivers;
     }
     free(positions);
     free(normals);
     free(visibility);
+    free(standard_error);
     free(emission);
     return ok;
 }
@@ -176,13 +187,18 @@ static bool record(struct technique_run *run, struct pen_error *error)
     /* A light is traced once; each face then takes its own receivers. */
     if (run->face == &run->light->faces[0] && !trace(run, error))
         return false;
-    struct pass_texture traced = {UNIT_FREE, s->visibility.name, GL_SAMPLE_NEAREST};
-    return pass_screen(run,
-        &(struct pass_screen){.name = "trace resolve",
-            .body = "raytraced.glsl",
-            .textures = &traced,
-            .texture_count = 1},
-        error);
+    run->work_counted = true;
+    struct pass_texture traced[] = {{UNIT_FREE, s->visibility.name, GL_SAMPLE_NEAREST},
+        {UNIT_FREE + 1, s->standard_error.name, GL_SAMPLE_NEAREST}};
+    struct pass_screen resolve = {
+        .name = "trace resolve", .body = "raytraced.glsl", .textures = traced, .texture_count = 2};
+    if (!pass_screen(run, &resolve, error) || !run->variance_framebuffer)
+        return run->variance_framebuffer == 0;
+    resolve.name = "trace variance";
+    resolve.defines = "#define VARIANCE\n";
+    resolve.framebuffer = run->variance_framebuffer;
+    resolve.add = true;
+    return pass_screen(run, &resolve, error);
 }
 
 const struct technique technique_raytraced = {
@@ -200,6 +216,7 @@ const struct technique technique_raytraced = {
         .struct_size = sizeof(struct raytraced),
         .params = {rows, sizeof rows / sizeof *rows}},
     .state_size = sizeof(struct state),
+    .estimates_error = true,
     .record = record,
     .destroy = destroy,
 };

@@ -78,7 +78,9 @@ bool pass_rays_host(struct technique_run *run, const struct ray_job *job, struct
         .depth_error = RAY_DEPTH_ERROR,
         .seed = job->seed};
     memcpy(trace.eye, run->view->eye, sizeof trace.eye);
-    struct pen_trace_result result = {.visibility = visibility, .standard_error = standard_error};
+    bool wants_error = run->variance_framebuffer != 0;
+    struct pen_trace_result result = {
+        .visibility = visibility, .standard_error = wants_error ? standard_error : NULL};
     struct pen_trace_stats stats;
     read_texture(&t->receivers[0], positions);
     read_texture(&t->receivers[1], normals);
@@ -87,7 +89,9 @@ bool pass_rays_host(struct technique_run *run, const struct ray_job *job, struct
     gl_timer_end(&run->ctx->timer);
     if (ok) {
         write_texture(run, &t->visibility, GL_RGBA32F, GL_RGBA, visibility);
-        write_texture(run, &t->standard_error, GL_R32F, GL_RED, standard_error);
+        gl_texture_fit(&t->standard_error, GL_R32F, run->width, run->height, 0, 1);
+        if (wants_error)
+            write_texture(run, &t->standard_error, GL_R32F, GL_RED, standard_error);
         run->result->rays += stats.rays;
         run->result->full_work_pixels += (uint32_t)stats.full_receivers;
     }

@@ -10,6 +10,9 @@ static const char *const backend_names[] = {"auto", "gpu",
 #endif
     NULL};
 
+/* Errors of several lights must not be alike, or they would not average out. */
+#define LIGHT_SEED 0x9e3779b9u
+
 struct raytraced {
     uint32_t samples;
     uint32_t weighting;
@@ -55,7 +58,7 @@ static bool trace(struct technique_run *run, struct pen_error *error)
         .target_error = params->target_error,
         .weighting = params->weighting,
         .adaptive = params->adaptive.on && run->face->half[0] > 0,
-        .seed = params->seed + run->frame};
+        .seed = params->seed + run->frame + LIGHT_SEED * run->light_index};
 #ifdef PENUMBRA_HAVE_TRACE
     bool software = run->ctx->device.software;
     if (params->backend == BACKEND_CPU || (params->backend == BACKEND_AUTO && software))
@@ -70,13 +73,20 @@ static bool record(struct technique_run *run, struct pen_error *error)
     /* A light is traced once; each face then takes its own receivers. */
     if (run->face == &run->light->faces[0] && !trace(run, error))
         return false;
-    struct pass_texture traced = {UNIT_FREE, s->targets.visibility.name, GL_SAMPLE_NEAREST};
-    return pass_screen(run,
-        &(struct pass_screen){.name = "trace resolve",
-            .body = "raytraced.glsl",
-            .textures = &traced,
-            .texture_count = 1},
-        error);
+    run->work_counted = true;
+    struct pass_texture traced[] = {{UNIT_FREE, s->targets.visibility.name, GL_SAMPLE_NEAREST},
+        {UNIT_FREE + 1, s->targets.standard_error.name, GL_SAMPLE_NEAREST}};
+    struct pass_screen resolve = {
+        .name = "trace resolve", .body = "raytraced.glsl", .textures = traced, .texture_count = 2};
+    if (!pass_screen(run, &resolve, error))
+        return false;
+    if (!run->variance_framebuffer)
+        return true;
+    resolve.name = "trace variance";
+    resolve.defines = "#define VARIANCE\n";
+    resolve.framebuffer = run->variance_framebuffer;
+    resolve.add = true;
+    return pass_screen(run, &resolve, error);
 }
 
 const struct technique technique_raytraced = {
@@ -94,6 +104,7 @@ const struct technique technique_raytraced = {
         .struct_size = sizeof(struct raytraced),
         .params = {rows, sizeof rows / sizeof *rows}},
     .state_size = sizeof(struct state),
+    .estimates_error = true,
     .record = record,
     .destroy = destroy,
 };

@@ -68,7 +68,7 @@ static double truth_mask(double x, double z, const void *user)
     return 1 - (double)hidden / (GRID * GRID);
 }
 
-/* Every pixel within 4.5 standard errors but for one in a thousand, and the mean of all within 3 of
+/* Every pixel within 3 standard errors but for one in a thousand, and the mean of all within 3 of
  * its own. An error cannot be estimated to better than a sample's worth. */
 static void check_truth(const char *name, const uint8_t *id, const char *settings,
     truth_function truth, const void *user)
@@ -78,21 +78,21 @@ static void check_truth(const char *name, const uint8_t *id, const char *setting
     double sum = 0, variance = 0;
     uint32_t pixels = 0, outside = 0, partial = 0;
     render(id, "gpu", SAMPLES, settings, &shot);
-    CHECK(ran(&shot, "ray samples"));
+    CHECK(ran(&shot, "ray samples") && shot.error);
     for (uint32_t i = 0; i < shot.width * shot.height; i++) {
         const float *p = shot.position + 4 * i;
         if (fabsf(p[1]) > 1e-3f || shot.normal[4 * i + 1] < 0.5f)
             continue;
-        double expected = truth(p[0], p[2], user), error = 0.03; // X
+        double expected = truth(p[0], p[2], user), error = shot.error[4 * i];
         double difference = shot.visibility[4 * i + 3] - expected;
         double error2 = error * error + 1.0 / SAMPLES / SAMPLES;
-        outside += fabs(difference) > 4.5 * sqrt(error2);
+        outside += fabs(difference) > 3 * sqrt(error2);
         partial += expected > 0.02 && expected < 0.98;
         sum += difference;
         variance += error2;
         pixels++;
     }
-    fprintf(stderr, "%-28s mean error %+.5f, beyond 4.5 SE: %u of %u, penumbra %u\n", name,
+    fprintf(stderr, "%-28s mean error %+.5f, beyond 3 SE: %u of %u, penumbra %u\n", name,
         sum / pixels, outside, pixels, partial);
     CHECK(pixels > 4000 && outside * 1000 <= pixels);
     CHECK(fabs(sum) <= 3 * sqrt(variance));
@@ -183,6 +183,7 @@ static struct compared compare(const struct shot *a, const struct shot *b, doubl
         double worst = 0;
         for (int k = 0; k < 4; k++)
             worst = fmax(worst, fabs(a->visibility[4 * i + k] - b->visibility[4 * i + k]));
+        worst = fmax(worst, fabs(a->error[4 * i] - b->error[4 * i]));
         c.rmse += worst * worst;
         c.other += worst > 1.01 * sample;
     }
@@ -197,6 +198,7 @@ static uint64_t check_backends(
     struct shot cpu, gpu;
     render(id, "cpu", samples, settings, &cpu);
     render(id, "gpu", samples, settings, &gpu);
+    CHECK(cpu.error && gpu.error);
     struct compared c = compare(&cpu, &gpu, 1.0 / samples);
     uint64_t rays = gpu.result.rays;
     int64_t more = (int64_t)(rays - cpu.result.rays);

@@ -58,14 +58,27 @@ static bool upload_all(struct technique_run *run, const struct pen_bvh *bvh,
     return true;
 }
 
+/* No hierarchy over more triangles can fit: a leaf holds PEN_BVH_LEAF at most, and a tree has
+ * almost two nodes for each leaf. At least 1. */
+static uint64_t most_triangles(const struct technique_run *run, uint64_t max_block)
+{
+    uint64_t have = run->ctx->gpu_memory, used = run->scene->bytes;
+    uint64_t each =
+        sizeof(struct pen_bvh_triangle) + 2 * sizeof(struct pen_bvh_node) / PEN_BVH_LEAF;
+    uint64_t room = have > used ? (have - used) / each : 0;
+    uint64_t most = max_block / sizeof(struct pen_bvh_triangle);
+    most = room < most ? room : most;
+    return most ? most : 1;
+}
+
 static bool build(struct technique_run *run, struct pen_error *error)
 {
     GLint64 max_block = 0;
     gl.GetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &max_block);
-    uint64_t limit = (uint64_t)max_block, most = limit / sizeof(struct pen_bvh_triangle);
+    uint64_t limit = (uint64_t)max_block;
     struct pen_bvh bvh;
     struct ray_alpha alpha = {0};
-    bool ok = pen_bvh_build_scene(&run->scene->blob, most, &bvh, error) &&
+    bool ok = pen_bvh_build_scene(&run->scene->blob, most_triangles(run, limit), &bvh, error) &&
               ray_alpha_make(&run->scene->blob, &bvh, limit, &alpha, error) &&
               upload_all(run, &bvh, &alpha, limit, error);
     ray_alpha_finish(&alpha);

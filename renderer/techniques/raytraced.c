@@ -59,12 +59,21 @@ static bool trace(struct technique_run *run, struct pen_error *error)
         .weighting = params->weighting,
         .adaptive = params->adaptive.on && run->face->half[0] > 0,
         .seed = params->seed + run->frame + LIGHT_SEED * run->light_index};
+    struct pen_error refused = {0};
 #ifdef PENUMBRA_HAVE_TRACE
-    bool software = run->ctx->device.software;
-    if (params->backend == BACKEND_CPU || (params->backend == BACKEND_AUTO && software))
+    bool automatic = params->backend == BACKEND_AUTO;
+    if (params->backend == BACKEND_CPU || (automatic && run->ctx->device.software))
         return pass_rays_host(run, &job, &s->targets, error);
 #endif
-    return pass_rays_device(run, &job, &s->targets, error);
+    if (pass_rays_device(run, &job, &s->targets, &refused))
+        return true;
+#ifdef PENUMBRA_HAVE_TRACE
+    if (automatic && refused.code == PEN_TOO_LARGE) {
+        pen_result_warn(run->result, "Rays were traced on the CPU. %s", refused.message);
+        return pass_rays_host(run, &job, &s->targets, error);
+    }
+#endif
+    return pen_fail(error, refused.code, refused.pointer, "%s", refused.message);
 }
 
 static bool record(struct technique_run *run, struct pen_error *error)

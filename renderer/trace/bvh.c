@@ -24,7 +24,8 @@ struct split {
     float low, scale, cost;
 };
 
-/* Where no NaN can be: fminf and fmaxf are calls into the mathematics library. */
+/* fminf and fmaxf are calls into the mathematics library. Where a is NaN these give b: what grows
+ * ignores a triangle whose transform overflowed. */
 static inline float lesser(float a, float b)
 {
     return a < b ? a : b;
@@ -41,8 +42,8 @@ static const struct box empty_box = {
 static void grow(struct box *box, const struct box *by)
 {
     for (int c = 0; c < 3; c++) {
-        box->low[c] = lesser(box->low[c], by->low[c]);
-        box->high[c] = greater(box->high[c], by->high[c]);
+        box->low[c] = lesser(by->low[c], box->low[c]);
+        box->high[c] = greater(by->high[c], box->high[c]);
     }
 }
 
@@ -141,8 +142,8 @@ static uint32_t divide(struct item *items, uint32_t count, float area, uint32_t 
     struct box centres = empty_box;
     for (uint32_t i = 0; i < count; i++)
         for (int c = 0; c < 3; c++) {
-            centres.low[c] = lesser(centres.low[c], middle(&items[i], c));
-            centres.high[c] = greater(centres.high[c], middle(&items[i], c));
+            centres.low[c] = lesser(middle(&items[i], c), centres.low[c]);
+            centres.high[c] = greater(middle(&items[i], c), centres.high[c]);
         }
     for (int axis = 0; axis < 3; axis++) {
         struct split s = split_axis(items, count, axis, centres.low[axis], centres.high[axis]);

@@ -25,14 +25,19 @@ int main(int argc, char **argv)
     snprintf(path, sizeof path, "%s/stanford-bunny-on-plane.pscene", argc > 1 ? argv[1] : ".");
     if (!harness_scene_file(path, id))
         return 77;
-    struct shot few, many, pcss, none;
+    struct shot few, many, traced, pcss, none;
     harness_shot(id, "technique=multisample&samples=256&" VIEW, &few);
     harness_shot(id, "technique=multisample&samples=1024&map_size=1024&" VIEW, &many);
+    harness_shot(id, "technique=raytraced&samples=256&" VIEW, &traced);
     harness_shot(id, "technique=pcss&" VIEW, &pcss);
     harness_shot(id, "technique=none&" VIEW, &none);
     fprintf(stderr, "256 against 1024 samples: rmse %.5f; pcss %.5f; no shadow %.5f\n",
         rmse(&few, &many), rmse(&pcss, &many), rmse(&none, &many));
+    fprintf(stderr, "against rays: 1024 maps %.5f, pcss %.5f\n", rmse(&many, &traced),
+        rmse(&pcss, &traced));
     CHECK(rmse(&few, &many) < 0.005);
+    CHECK(rmse(&many, &traced) < 0.01);
+    CHECK(rmse(&pcss, &traced) < 0.0235); /* 0.0244 with the light below horizons for lit */
     CHECK(rmse(&pcss, &many) < 0.5 * rmse(&none, &many));
     CHECK(harness_not_finite(&many) == 0);
     CHECK_DONE();

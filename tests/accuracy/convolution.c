@@ -198,8 +198,9 @@ static void check_leaks(const char *method)
     harness_shot_finish(&shot);
 }
 
-/* Two planes in one window: the width tells the blocker average, and 5 % of it are 0.02 of the depth
- * range here. Without the offset lit texels count as half a blocker each, and it must fail. */
+/* Two planes in one window: the width tells the blocker average, and 5 % of it are 0.02 of the
+ * depth range here. Without the offset lit texels count as half a blocker each, and it must fail.
+ */
 static double two_plane_width_error(const char *method)
 {
     char settings[512];

@@ -1,5 +1,5 @@
-/* One line in the registry is enough: the method is in the catalogue and in the OpenAPI document, its
- * parameters are read and reach its shader, and it renders. */
+/* One line in the registry is enough: the method is in the catalogue and in the OpenAPI document,
+ * its parameters are read and reach its shader, and it renders. */
 #include "protocol/openapi.h"
 #include "tests/accuracy/harness.h"
 #include "tests/unit/check.h"

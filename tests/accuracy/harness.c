@@ -92,6 +92,7 @@ void harness_shot(const uint8_t id[PEN_ID_BYTES], const char *settings, struct s
         float **to = !strcmp(frame.planes[i].name, "visibility") ? &shot->visibility
                      : !strcmp(frame.planes[i].name, "position") ? &shot->position
                      : !strcmp(frame.planes[i].name, "normal")   ? &shot->normal
+                     : !strcmp(frame.planes[i].name, "beauty")   ? &shot->beauty
                      : !strcmp(frame.planes[i].name, "classes")  ? &shot->classes
                      : !strcmp(frame.planes[i].name, "error")    ? &shot->error
                                                                  : NULL;
@@ -108,6 +109,7 @@ void harness_shot_finish(struct shot *shot)
     free(shot->visibility);
     free(shot->position);
     free(shot->normal);
+    free(shot->beauty);
     free(shot->classes);
     free(shot->error);
     memset(shot, 0, sizeof *shot);

@@ -9,6 +9,7 @@ struct shot {
     float *visibility; /* RGBA per pixel: rgb coloured, a mean visibility */
     float *position;   /* RGBA per pixel: world xyz; background: 0 */
     float *normal;     /* RGBA per pixel: world shading normal; background: 0 */
+    float *beauty;     /* RGBA per pixel: linear radiance */
     float *classes;    /* RGBA per pixel: r = 0 proved lit, 1 undecided, 2 proved in umbra */
     float *error;      /* RGBA per pixel: r = standard error; NULL when not estimated */
     struct pen_result result;

@@ -33,6 +33,7 @@ struct technique_ctx {
     struct gl_texture sum;            /* RGBA32F accumulator of methods that add passes */
     GLuint sum_framebuffer;
     struct gl_texture scratch[12]; /* of passes/scratch.c */
+    uint64_t gpu_memory;           /* the budget of everything, bytes */
     uint64_t shadow_memory;        /* bytes that kept shadow inputs of a frame may take together */
     uint64_t shadow_budget; /* the share of one face of one light in it; set for every frame */
 };

@@ -166,8 +166,8 @@ static bool resolve_emissions(struct frame *f, struct pen_error *error)
     return true;
 }
 
-static bool record_face(struct frame *f, uint32_t light, uint32_t number,
-    const struct gl_texture **tiles, bool *counted, struct pen_error *error)
+static bool record_face(
+    struct frame *f, uint32_t light, uint32_t number, bool *counted, struct pen_error *error)
 {
     const struct frame_job *job = f->job;
     struct light_face *face = &f->lights[light].faces[number];
@@ -199,24 +199,20 @@ static bool record_face(struct frame *f, uint32_t light, uint32_t number,
                                     : 0};
     if (!job->technique->record(&run, error))
         return false;
-    *tiles = run.tiles;
     *counted |= run.work_counted;
-    return true;
+    f->classified |= run.tiles != NULL;
+    return !frame_layers_want_classes(job->request) ||
+           frame_layers_add_classes(job, run.tiles, number == 0, error);
 }
 
 static bool record_light(struct frame *f, uint32_t light, struct pen_error *error)
 {
-    const struct frame_job *job = f->job;
-    const struct gl_texture *tiles = NULL;
     bool counted = false;
     for (uint32_t k = 0; k < f->lights[light].face_count; k++)
-        if (!record_face(f, light, k, &tiles, &counted, error))
+        if (!record_face(f, light, k, &counted, error))
             return false;
     f->work.lights[f->number] += !counted;
-    f->classified |= tiles != NULL;
-    /* The faces of a cube cut through tiles: nothing is proved there. */
-    return !frame_layers_want_classes(job->request) ||
-           frame_layers_add_classes(job, f->lights[light].face_count == 1 ? tiles : NULL, error);
+    return true;
 }
 
 static bool record_visibility(struct frame *f, struct pen_error *error)

@@ -37,13 +37,13 @@ void frame_layers_begin(const struct frame_job *job, struct pen_result *result)
         pen_result_warn(result, "%s does not estimate its error: the layer is 0.", title);
 }
 
-bool frame_layers_add_classes(
-    const struct frame_job *job, const struct gl_texture *tiles, struct pen_error *error)
+bool frame_layers_add_classes(const struct frame_job *job, const struct gl_texture *tiles,
+    bool first, struct pen_error *error)
 {
     struct pass_texture textures[] = {
         {UNIT_DEPTH, job->targets->gbuffer.depth.name, GL_SAMPLE_NEAREST},
         {UNIT_TILES, tiles ? tiles->name : 0, GL_SAMPLE_NEAREST}};
-    int32_t tile[4] = {CLASSIFY_TILE};
+    int32_t tile[4] = {CLASSIFY_TILE, first ? 1 : 0};
     return pass_fill(job->ctx,
         &(struct pass_fill){.name = "classes",
             .fragment = "classes.frag",

@@ -10,10 +10,10 @@ bool frame_layers_want_error(const struct pen_request *request, const struct tec
 /* Makes what the request wants fit, and clears it. Warns of an error layer that will be 0. */
 void frame_layers_begin(const struct frame_job *job, struct pen_result *result);
 
-/* Adds one light of one jittered frame. `tiles`: of pass_classify, or NULL when the method worked
- * on every pixel. */
-bool frame_layers_add_classes(
-    const struct frame_job *job, const struct gl_texture *tiles, struct pen_error *error);
+/* Adds one face of one light of one jittered frame. `tiles`: of pass_classify, or NULL when the
+ * method worked on every pixel. `first`: of the light's faces; the background counts with it. */
+bool frame_layers_add_classes(const struct frame_job *job, const struct gl_texture *tiles,
+    bool first, struct pen_error *error);
 
 /* Pixels that show a surface, for the lights whose method worked on all of them. */
 struct frame_work {

@@ -39,9 +39,16 @@ bool pass_fill_umbra(struct technique_run *run, const struct gl_texture *tiles, 
     return true;
 }
 
+/* What a method needs to be true of a decided tile. */
+struct claim {
+    float margin_texels, margin_pixels;
+    bool umbra;      /* looked for too */
+    bool one_window; /* its windows do not shrink by caster, but with the nearest one only */
+    bool seams;      /* it needs what lies beyond the faces of a cube */
+};
+
 static const struct gl_texture *classify(struct technique_run *run,
-    const struct shadow_input *casters, float margin_texels, float margin_pixels, bool umbra,
-    struct pen_error *error)
+    const struct shadow_input *casters, const struct claim *claim, struct pen_error *error)
 {
     struct technique_ctx *ctx = run->ctx;
     struct gl_texture *tiles = &ctx->tiles;
@@ -54,8 +61,8 @@ static const struct gl_texture *classify(struct technique_run *run,
     }
     /* Spheres' far sides and textured lights need no zero tiles of their own: 0 is 0 in any colour;
      * but an omnidirectional light lights what lies behind its plane. */
-    struct classify_block block = {.margin = {margin_texels + 1, margin_pixels},
-        .tile = {CLASSIFY_TILE, umbra && !run->face->omni ? 1 : 0}};
+    struct classify_block block = {.margin = {claim->margin_texels + 1, claim->margin_pixels},
+        .tile = {CLASSIFY_TILE, claim->umbra && !run->face->omni, claim->one_window, claim->seams}};
     struct pass_texture textures[] = {{UNIT_DEPTH, run->gbuffer->depth.name, GL_SAMPLE_NEAREST},
         {UNIT_NORMAL, run->gbuffer->normal.name, GL_SAMPLE_NEAREST},
         {UNIT_MIN_MAX, casters->textures[0].name, GL_SAMPLE_NEAREST}};
@@ -73,22 +80,27 @@ static const struct gl_texture *classify(struct technique_run *run,
             error) ||
         !pass_fill_umbra(run, tiles, run->vis_framebuffer, error))
         return NULL;
-    /* All faces of a cube see all receivers here, and each leaves every tile undecided. */
-    if (run->face == &run->light->faces[0])
-        count_classes(run, tiles);
+    count_classes(run, tiles);
     return run->tiles = tiles;
 }
 
 const struct gl_texture *pass_classify(struct technique_run *run,
     const struct shadow_input *casters, float margin_texels, struct pen_error *error)
 {
-    return classify(run, casters, margin_texels, 0, true, error);
+    return classify(
+        run, casters, &(struct claim){.margin_texels = margin_texels, .umbra = true}, error);
+}
+
+const struct gl_texture *pass_classify_screen(struct technique_run *run,
+    const struct shadow_input *casters, float margin_texels, struct pen_error *error)
+{
+    return classify(run, casters, &(struct claim){margin_texels, 0, true, true, true}, error);
 }
 
 const struct gl_texture *pass_classify_lit(struct technique_run *run,
     const struct shadow_input *casters, float margin_texels, struct pen_error *error)
 {
-    return classify(run, casters, margin_texels, 0, false, error);
+    return classify(run, casters, &(struct claim){.margin_texels = margin_texels}, error);
 }
 
 bool pass_lit_tiles(struct technique_run *run, uint32_t map_size, float margin_texels,
@@ -99,6 +111,7 @@ bool pass_lit_tiles(struct technique_run *run, uint32_t map_size, float margin_t
         return true;
     const struct shadow_input *casters = pass_caster_min_max(run, map_size, error);
     if (casters)
-        *tiles = classify(run, casters, margin_texels, margin_pixels, false, error);
+        *tiles = classify(
+            run, casters, &(struct claim){margin_texels, margin_pixels, false, true}, error);
     return *tiles != NULL;
 }

@@ -10,13 +10,20 @@ enum tile_class { TILE_LIT, TILE_UNDECIDED, TILE_UMBRA, TILE_EMPTY };
 
 /* Classifies run's face and writes 0 to the umbra tiles of vis. `margin_texels`: how far beyond the
  * filter windows the method may look. Adds the receivers to run->result->class_pixels, and the
- * undecided ones to full_work_pixels. The answer is valid until the next call and also in
- * run->tiles; pass it to pass_screen as `tiles`. */
+ * undecided ones to full_work_pixels. Of a cube's faces, each classifies the tiles that it owns
+ * wholly, leaves those that it owns in part undecided, and calls the others empty. The answer is
+ * valid until the next call and also in run->tiles; pass it to pass_screen as `tiles`. */
 const struct gl_texture *pass_classify(struct technique_run *run,
     const struct shadow_input *casters, float margin_texels, struct pen_error *error);
 
-/* The same without umbra: for methods that look from other points of the emitter, which may see
- * between casters that hide each other from its centre. */
+/* The same for methods that filter on the screen: over the seams of a cube's faces, which all stay
+ * undecided. They also size one window by the nearest caster of all, and may take into it what lies
+ * too near the receiver to reach that far. */
+const struct gl_texture *pass_classify_screen(struct technique_run *run,
+    const struct shadow_input *casters, float margin_texels, struct pen_error *error);
+
+/* The same as pass_classify without umbra: for methods that look from other points of the emitter,
+ * which may see between casters that hide each other from its centre. */
 const struct gl_texture *pass_classify_lit(struct technique_run *run,
     const struct shadow_input *casters, float margin_texels, struct pen_error *error);
 

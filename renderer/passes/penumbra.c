@@ -13,7 +13,7 @@ bool pass_penumbra_tiles(struct technique_run *run, const struct shadow_input *c
     if (!run->request->classify.on)
         return true;
     GLuint program = gl_programs_get(run->ctx->programs, &desc, error);
-    if (!program || !(*tiles = pass_classify(run, casters, margin_texels, error)))
+    if (!program || !(*tiles = pass_classify_screen(run, casters, margin_texels, error)))
         return false;
     GLuint framebuffer = gl_framebuffer_create(&scratch, 1, NULL);
     pass_draw_tiles(

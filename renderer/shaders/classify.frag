@@ -4,11 +4,25 @@
 #include "min_max.glsl"
 layout(std140, binding = 3) uniform ClassifyBlock {
     vec4 margin; // x: texels of the full map, y: pixels of the image
-    ivec4 tile;  // x: px
+    ivec4 tile;  // x: px, y: 1 when umbra is looked for, z: 1 when windows are not shrunk by
+                 // caster, w: 1 when faces of a cube stay undecided
 } classify;
 layout(location = 0) out vec4 tile_class; // class / 255, receivers / 255
 
 const float LIT = 0.0, UNDECIDED = 1.0, UMBRA = 2.0, EMPTY = 3.0;
+
+// A cube's face only owns receivers inside its pyramid, as in screen.frag.
+int owned_receivers(ivec2 first, ivec2 end)
+{
+    int count = 0;
+    for (int y = first.y; y < end.y; y++)
+        for (int x = first.x; x < end.x; x++) {
+            float d = texelFetch(g_depth, ivec2(x, y), 0).r;
+            vec3 p = unproject(light.clip_to_light, pixel_to_ndc(ivec2(x, y)), max(d, 1e-20));
+            count += d == 0.0 || max(abs(p.x), abs(p.y)) > p.z ? 0 : 1;
+        }
+    return count;
+}
 
 // Whether all of the emitter is above the horizon of every receiver of the tile. What turns away from
 // it may be thin or leave no depth in the map, and still sees nothing of the light. `low`, `high`:
@@ -56,21 +70,36 @@ float classify_tile(ivec2 first, ivec2 size, out int receivers)
     vec2 ndc_high = pixel_to_ndc(end - 1) + vec2(1.0, -1.0) * view.viewport.zw;
     vec2 q_low = vec2(1e30), q_high = vec2(-1e30);
     vec3 p_low = vec3(1e30), p_high = vec3(-1e30);
+    vec4 nearest_side = vec4(1e30), farthest_side = vec4(-1e30); // of a cube face's pyramid, out > 0
+    bool behind = false;
     for (int i = 0; i < 8; i++) {
         vec2 ndc = vec2((i & 1) != 0 ? ndc_high.x : ndc_low.x, (i & 2) != 0 ? ndc_high.y : ndc_low.y);
         vec3 p = unproject(light.clip_to_light, ndc, (i & 4) != 0 ? high : low);
         p_low = min(p_low, p);
         p_high = max(p_high, p);
-        if (light.parallel == 0 && p.z <= light.near_z)
-            return UNDECIDED; // beside or behind the light: nothing to project
+        vec4 side = vec4(p.xy, -p.xy) - p.z;
+        nearest_side = min(nearest_side, side);
+        farthest_side = max(farthest_side, side);
+        behind = behind || (light.parallel == 0 && p.z <= light.near_z);
         vec2 q = light_project(p);
         q_low = min(q_low, q);
         q_high = max(q_high, q);
     }
     float near_z = p_low.z, far_z = p_high.z;
-    // A cube face only owns receivers inside its pyramid.
-    if (light.cube != 0)
-        return UNDECIDED;
+    if (light.cube != 0) {
+        float rounding = 1e-4 * max(length(p_low), length(p_high));
+        bool foreign = any(greaterThan(nearest_side, vec4(rounding))) || p_high.z < -rounding;
+        if (foreign && classify.tile.w == 0) {
+            receivers = 0;
+            return EMPTY;
+        }
+        if (classify.tile.w != 0 || any(greaterThan(farthest_side, vec4(-rounding)))) {
+            receivers = owned_receivers(first, end);
+            return UNDECIDED;
+        }
+    }
+    if (behind)
+        return UNDECIDED; // beside or behind the light: nothing to project
     vec2 texel = (light.rect.zw - light.rect.xy) / vec2(2 * textureSize(min_max_pyramid, 0));
     vec2 center = 0.5 * (q_low + q_high), spread = 0.5 * (q_high - q_low) + classify.margin.x * texel;
     float pixel = view.forward.w / (low * view.eye.w); // m, of the farthest receiver
@@ -91,6 +120,10 @@ float classify_tile(ivec2 first, ivec2 size, out int receivers)
     ivec2 b = clamp(ivec2(high_uv * scale), ivec2(0), last);
     vec2 cell = (light.rect.zw - light.rect.xy) / scale, reach = vec2(0.0);
     bool blocked = false;
+    // A method that filters depths over one window looks as far as the nearest caster calls for.
+    vec2 widest = vec2(0.0);
+    if (classify.tile.z != 0)
+        widest = light_filter_extent(min(min_max_window(center, search).x, far_z), far_z);
     for (int y = a.y; y <= b.y; y++)
         for (int x = a.x; x <= b.x; x++) {
             float z = texelFetch(min_max_pyramid, ivec2(x, y), level).r;
@@ -98,7 +131,7 @@ float classify_tile(ivec2 first, ivec2 size, out int receivers)
             vec2 extra = vec2(x == last.x ? cell.x : 0.0, y == last.y ? cell.y : 0.0);
             vec2 middle = light.rect.xy + (vec2(x, y) + 0.5) * cell + 0.5 * extra;
             vec2 gap = abs(middle - center) - 0.5 * (cell + extra) - spread;
-            vec2 window = light_filter_extent(min(z, far_z), far_z);
+            vec2 window = classify.tile.z != 0 ? widest : light_filter_extent(min(z, far_z), far_z);
             if (z < far_z + slack && all(lessThanEqual(gap, window))) {
                 blocked = true;
                 reach = max(reach, window);

@@ -15,6 +15,47 @@ static void render(const uint8_t *id, const char *method, const char *light, con
 
 #define TWO_COLOUR "&light.texture.pattern=two-colour"
 
+/* The published threshold splits where E - E^2 > 0.2244: 0.34 < E < 0.66, and nowhere else. */
+static void check_published_threshold(const uint8_t *id)
+{
+    struct shot shot;
+    uint32_t expected = 0;
+    render(
+        id, "adaptive&theta=0.2244&blend=0&classify=off", textured_light(0, -1), TWO_COLOUR, &shot);
+    for (uint32_t i = 0; i < shot.width * shot.height; i++) {
+        double e = truth_half_plane(shot.position[4 * i], 0, &t5);
+        expected += e - e * e > 0.2244;
+    }
+    const uint32_t *split = shot.result.subdivided_pixels;
+    fprintf(stderr, "theta 0.2244: %u pixels split, %u expected\n", split[0] + split[1], expected);
+    CHECK_NEAR(split[0] + split[1], expected, 0.05 * expected);
+    harness_shot_finish(&shot);
+}
+
+/* A cell also needs emission that varies: standard deviation over mean of at least `colour`. Half
+ * of this light emits 1, half 1 - d: a ratio of d / (2 - d). */
+static void check_emission_criterion(const uint8_t *id)
+{
+    static const uint8_t pairs[2][2 * 4] = {
+        {255, 255, 255, 255, 235, 235, 235, 255}, /* d = 20 / 255: 0.041 */
+        {255, 255, 255, 255, 225, 225, 225, 255}, /* d = 30 / 255: 0.063 */
+    };
+    static const char *const images[] = {
+        "&light.texture.image=e114000000000000000000000000000000000000000000000000000000000000",
+        "&light.texture.image=e115000000000000000000000000000000000000000000000000000000000000"};
+    for (uint32_t k = 0; k < 2; k++) {
+        uint8_t image[PEN_ID_BYTES];
+        struct shot shot;
+        textured_image(20 + k, 2, 1, 1, pairs[k], image);
+        render(id, "adaptive", textured_light(0, -1), images[k], &shot);
+        const uint32_t *split = shot.result.subdivided_pixels;
+        fprintf(stderr, "emission of little contrast %u: split %u %u\n", k, split[0], split[1]);
+        CHECK((split[0] + split[1] > 1000) == (k == 1));
+        CHECK(k == 1 || split[0] + split[1] == 0);
+        harness_shot_finish(&shot);
+    }
+}
+
 static double t5_error(const uint8_t *id, const char *method, int axis, int sign)
 {
     /* Axis y has its colours from an image: top red, bottom green. */
@@ -149,6 +190,8 @@ int main(void)
     textured_image(10, 1, 2, 1, top_red, image);
     check_t5(id);
     check_thresholds(id);
+    check_published_threshold(id);
+    check_emission_criterion(id);
     check_white(id);
     check_classify(id);
     check_seams(id);

@@ -166,18 +166,18 @@ static void check_unclassified(const uint8_t *half)
     }
 }
 
-/* A lamp between casters has a cube of maps, whose faces prove nothing, and each pixel counts once.
- */
+/* A lamp between casters has a cube of maps: the face that owns a tile proves it lit, and each
+ * pixel counts once. */
 static void check_cube(const uint8_t *demo)
 {
     struct shot shot;
     uint32_t count[3];
     harness_shot(demo,
-        "technique=pcss&width=160&height=120&ground=off&light.type=sphere&light.radius=0.1"
-        "&light.position=0.5,0.8,0.5",
+        "technique=pcss&width=320&height=240&light.type=sphere&light.radius=0.1"
+        "&light.position=1,3,1",
         &shot);
     count_classes(&shot, count);
-    CHECK(count[UNDECIDED] == harness_receivers(&shot) && count[LIT] == 0 && count[UMBRA] == 0);
+    CHECK(count[LIT] + count[UNDECIDED] == harness_receivers(&shot) && count[LIT] > 1000);
     CHECK(!memcmp(count, shot.result.class_pixels, sizeof count));
     CHECK(shot.result.full_work_pixels == count[UNDECIDED]);
     harness_shot_finish(&shot);

@@ -1,3 +1,6 @@
 penumbra_accuracy_test(moments_blocks)
+target_sources(accuracy_moments_blocks PRIVATE compute.c)
+penumbra_accuracy_test(sat_blocks)
+target_sources(accuracy_sat_blocks PRIVATE compute.c)
 penumbra_accuracy_test(moments_hard)
 penumbra_accuracy_test(moments_soft)

@@ -104,6 +104,7 @@ int main(void)
     CHECK_NEAR(vsm.most, 0.36, 0.01);
     CHECK_NEAR(vsm.at_half, 0.265, 0.03);
     CHECK_NEAR(leak("vsm&bleed=0.2").most, (0.36 - 0.2) / 0.8, 0.01);
+    CHECK(leak("vsm&bleed=0.3").at_half < 0.001);
     CHECK(leak("vsm&bleed=0.37").most < 0.001);
     CHECK(leak("evsm").most < 0.01);
     CHECK(leak("msm").most < 0.01);

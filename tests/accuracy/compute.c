@@ -1,0 +1,80 @@
+#include "tests/accuracy/compute.h"
+#include "renderer/gl/context.h"
+#include "renderer/gl/source.h"
+#include "tests/unit/check.h"
+#include <stdlib.h>
+#include <string.h>
+
+bool compute_begin(struct technique_ctx *ctx, struct gl_context **context)
+{
+    struct pen_error error = {0};
+    struct pen_renderer_config config = {.debug = true};
+    *context = gl_context_create(&config, &ctx->device, &error);
+    if (!*context) {
+        fprintf(stderr, "skipped: %s\n", error.message);
+        return false;
+    }
+    ctx->programs = gl_programs_create();
+    gl_samplers_init(&ctx->samplers);
+    gl_timer_init(&ctx->timer, ctx->device.software);
+    gl.CreateVertexArrays(1, &ctx->empty_array);
+    return true;
+}
+
+void compute_end(struct technique_ctx *ctx, struct gl_context *context)
+{
+    gl.DeleteVertexArrays(1, &ctx->empty_array);
+    gl_timer_finish(&ctx->timer);
+    gl_samplers_finish(&ctx->samplers);
+    gl_programs_destroy(ctx->programs);
+    gl_context_destroy(context);
+}
+
+static const char *source(const char *name)
+{
+    const struct gl_source *s = gl_sources;
+    while (s->name && strcmp(s->name, name))
+        s++;
+    return s->name ? s->text : "";
+}
+
+void compute_run(const char *const *files, const char *main_text, uint32_t groups)
+{
+    const char *texts[8] = {"#version 450 core\nlayout(local_size_x = 64) in;\n"};
+    int count = 1;
+    for (; files[count - 1]; count++)
+        texts[count] = source(files[count - 1]);
+    texts[count++] = main_text;
+    GLuint shader = gl.CreateShader(GL_COMPUTE_SHADER), program = gl.CreateProgram();
+    gl.ShaderSource(shader, count, texts, NULL);
+    gl.CompileShader(shader);
+    gl.AttachShader(program, shader);
+    gl.LinkProgram(program);
+    GLint ok = 0;
+    char log[2048] = "";
+    gl.GetShaderInfoLog(shader, sizeof log, NULL, log);
+    gl.GetProgramiv(program, GL_LINK_STATUS, &ok);
+    if (!ok)
+        fprintf(stderr, "%s\n", log);
+    CHECK(ok);
+    gl.UseProgram(program);
+    gl.DispatchCompute(groups, 1, 1);
+    gl.MemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
+    gl.Finish();
+    gl.DeleteShader(shader);
+    gl.DeleteProgram(program);
+}
+
+GLuint compute_buffer(const void *data, size_t bytes, GLenum target, GLuint binding)
+{
+    GLuint buffer;
+    gl.CreateBuffers(1, &buffer);
+    gl.NamedBufferStorage(buffer, (GLsizeiptr)bytes, data, 0);
+    gl.BindBufferBase(target, binding, buffer);
+    return buffer;
+}
+
+double compute_random(void)
+{
+    return rand() / (RAND_MAX + 1.0);
+}

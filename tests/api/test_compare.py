@@ -5,6 +5,7 @@ import signal
 import struct
 import subprocess
 import threading
+import time
 import unittest
 import zlib
 
@@ -307,6 +308,63 @@ class Auto(unittest.TestCase):
         tight = self.record({"budget_ms": 0.01})
         self.assertEqual(len(tight["warnings"]), 1)
         self.assertIn("nothing meets", tight["warnings"][0])
+
+    def test_kinds_of_view(self):
+        """With a budget alone, times of another view of the same kind will do: a camera or a light
+        that moves is not measured anew for every image, more lights are."""
+        folder = os.path.join(self.d.store, "scenes", self.id)
+
+        def tables():
+            with open(os.path.join(folder, next(iter(self.files())))) as file:
+                return len(json.load(file)["tables"])
+        self.record({"budget_ms": 50000})
+        known = tables()
+        light = VIEW["lights"][0]
+        for moved in ({"camera": {"orbit": {"azimuth_deg": 33}}},
+                      {"lights": [{**light, "position": [0.5, 2.4, 0.4], "power_w": 50}]}):
+            record = self.record({"budget_ms": 50000}, **moved)
+            self.assertIn("from another view", record["choice"])
+        self.assertEqual(tables(), known)
+        record = self.record({"budget_ms": 50000},
+                             lights=[light, {**light, "position": [-0.5, 2.4, 0.4]}])
+        self.assertNotIn("from another view", record["choice"])
+        self.assertEqual(tables(), known + 1)
+
+    def test_restart(self):
+        """A daemon that is started again knows what was measured; from a damaged file it learns
+        nothing, and measures anew."""
+        first = self.record({"max_rmse": 0.05})
+        self.assertEqual(self.d.stop(), 0)
+        self.d.start()
+        self.d.worker()
+        before = self.files()
+        again = self.record({"max_rmse": 0.05})
+        self.assertEqual(self.files(), before)
+        self.assertEqual(again["choice"].split(",")[0].split(":")[1],
+                         first["choice"].split(",")[0].split(":")[1])  # the RMSE
+        path = os.path.join(self.d.store, "scenes", self.id, next(iter(before)))
+        for damage in (b"", b"{", b"[]", b'{"measured_by": 1}', b"\0" * 5000,
+                       b'{"tables": [{"setup": "x"}]}'):
+            with open(path, "wb") as file:
+                file.write(damage)
+            self.record({"max_rmse": 0.05})
+            with open(path) as file:
+                self.assertEqual(len(json.load(file)["tables"]), 1)
+
+    def test_deleted(self):
+        """A scene that goes away while it is measured: an error, and nothing stays behind."""
+        scene = self.d.upload(harness.grid_scene(3, "deleted"))
+        answers = []
+        thread = threading.Thread(target=lambda: answers.append(self.d.render(
+            scene, {**VIEW, "technique": "auto"}, fresh=False)))
+        thread.start()
+        time.sleep(0.3)
+        gone = self.d.call("DELETE", "/v1/scenes/" + scene)
+        thread.join()
+        self.assertEqual(gone.status, 204)
+        self.assertIn(answers[0].status, (200, 404), answers[0].body)
+        self.assertEqual(self.d.get("/v1/scenes/" + scene).status, 404)
+        self.assertEqual(self.d.render(self.id, {**VIEW, "technique": "hard"}).status, 200)
 
     def test_image(self):
         """As an image: the header says what was taken, and the tag is that of the same request."""

@@ -126,6 +126,8 @@ def add_arguments(parser):
     parser.add_argument("--quick", action="store_true", help="smaller pictures, fewer rounds")
     parser.add_argument("--seconds", type=float, help="time for the rounds of one group")
     parser.add_argument("--repetitions", type=int, help="timed rounds; 0: errors only")
+    parser.add_argument("--fresh", action="store_true",
+                        help="measure again what an earlier run into the same folder measured")
     parser.add_argument("--tiny", action="store_true", help="only shows that everything runs")
 
 
@@ -145,7 +147,7 @@ def run(args):
     seconds = args.seconds or seconds
     repetitions = repetitions if args.repetitions is None else args.repetitions
     plan_methods(plan, scenes, names, size, samples, repetitions, seconds, ladders=not args.tiny)
-    device, groups = plan.run(args.build, args.out, args.device, "methods.jsonl")
+    device, groups = plan.run(args.build, args.out, args.device, "methods.jsonl", args.fresh)
     write_tables(args.out, device, list(groups.values()))
     return device, groups
 

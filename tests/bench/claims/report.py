@@ -34,7 +34,7 @@ svg .good { fill: var(--goodfill); } svg .fair { fill: var(--fairfill); }
 svg .shadowmap { color: #2f6fb5; } svg .reference { color: var(--bad); }
 figure { margin: 0; } img { width: 100%; height: auto; display: block; background: #888; }
 .pair, .sheet { display: grid; gap: .8rem; margin: .6rem 0 1.4rem; }
-.pair { grid-template-columns: repeat(auto-fit, minmax(300px, 1fr)); }
+.pair { grid-template-columns: repeat(auto-fill, minmax(240px, 1fr)); }
 .sheet { grid-template-columns: repeat(auto-fill, minmax(200px, 1fr)); }
 nav a { margin-right: 1rem; }
 """
@@ -66,7 +66,8 @@ def values_html(entry):
     for scene in entry["scenes"]:
         text = "%.3g" % scene["median"]
         if scene["rounds"] > 1:
-            text += ' <span class="soft">(%.3g to %.3g)</span>' % (scene["low"], scene["high"])
+            text += ' <span class="soft">(%.3g to %.3g, %d rounds)</span>' % (
+                scene["low"], scene["high"], scene["rounds"])
         lines.append('<span class="%s">%s</span> <span class="soft">%s</span>' % (
             scene["verdict"], text, escape(scene["scene"])))
     if entry["scenes"]:
@@ -89,7 +90,7 @@ def pairs_html(out, paper):
             cells = [figure(out, "%s--%s.png" % (scene["group"], name),
                             "%s, %s" % (name, scene["scene"])) for name in entry["pair"]]
             cells += [figure(out, "%s--%s--difference.png" % (scene["group"], name),
-                             "%s, visibility less the reference's: red too dark, blue too light"
+                             "%s, visibility less the reference's: red too light, blue too dark"
                              % name) for name in entry["pair"] if name != "reference"]
             parts.append("<h4>%s</h4><div class=pair>%s</div>" % (escape(entry["text"]),
                                                                   "".join(cells)))
@@ -179,7 +180,7 @@ def scene_html(out, group):
     return ("<h3 id=%s>%s</h3><p>Shadow inputs made anew for every image:</p>%s<p>Shadow inputs "
             "kept (a still light and scene):</p>%s%s%s<details><summary>Contact sheet</summary>"
             "<div class=sheet>%s</div></details><details><summary>Visibility less the reference's: "
-            "red too dark, blue too light, full at 0.25</summary><div class=sheet>%s</div></details>"
+            "red too light, blue too dark, full at 0.25</summary><div class=sheet>%s</div></details>"
             % (escape(group["group"], True), escape(title), plot(rows, "moving"),
                plot(rows, "kept"), table_html(rows), passes_html(rows), sheet, differences))
 

@@ -30,8 +30,8 @@ struct call {
     struct waiter waiter;
     bool holds_share, wants_record, is_cached;
     struct pen_compare *compare;
-    struct call *next_waiting; /* for a calibration */
-    char choice[256];          /* why this method was taken */
+    struct call *next_waiting;     /* for a calibration */
+    char choice[256];              /* why this method was taken */
     struct auto_expected expected; /* of it */
     bool choice_met, is_deferred;
     /* For the log: */

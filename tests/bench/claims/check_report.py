@@ -144,6 +144,16 @@ class Report(unittest.TestCase):
         xml.fromstring(svg.strip([(0.9, 0.8, 1.1, "partly")], (1, float("inf")),
                                  (0.5, float("inf"))))
 
+    def test_labels_are_readable(self):
+        """Thirty labels in a corner: none covers another or a point."""
+        points = [(200 + 37 * i % 90, 200 + 23 * i % 60, "method %d" % i) for i in range(30)]
+        boxes = [box for _, _, box, _ in svg.place_labels(points)]
+        self.assertEqual(len(boxes), len(points))
+        for i, box in enumerate(boxes):
+            self.assertFalse([other for other in boxes[:i] if svg.covers(box, other)])
+            self.assertFalse([p for p in points if svg.covers(box, (p[0] - 4, p[1] - 4, p[0] + 4,
+                                                                    p[1] + 4))])
+
     def test_page(self):
         groups = {"chun-x": group("chun-x", {"cssm": [8.0], "adaptive": [10.5], "fixed": [14.6]})}
         device = {"device": "a <b>", "gl": "4.5", "software": True, "methods": []}

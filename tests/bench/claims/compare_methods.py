@@ -55,6 +55,7 @@ def table_rows(group):
             times = bench.spread(bench.rounds(group, name, how=how))
             row[how + "_ms"] = times and times[0]
             row[how + "_quartiles_ms"] = times and times[1:]
+            row[how + "_rounds"] = len(bench.rounds(group, name, how=how))
         times = entry.get("moving")
         for stage in bench.FRAME:
             values = times and bench.spread(times[stage])

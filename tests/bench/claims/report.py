@@ -180,8 +180,8 @@ def scene_html(out, group):
                           for name in names[1:])
     return ("<h3 id=%s>%s</h3><p>Error against time, shadow inputs made anew for every image (blue: "
             "shadow maps and their filters, red: many samples of the light, drawn or traced):</p>%s"
-            "<p>The same with shadow inputs kept (a still light and scene):</p>%s%s%s<details><summary>Contact sheet</summary>"
-            "<div class=sheet>%s</div></details><details><summary>Visibility less the reference's: "
+            "<p>The same with shadow inputs kept (a still light and scene):</p>%s%s%s<details><summary>Contact "
+            "sheet</summary><div class=sheet>%s</div></details><details><summary>Visibility less the reference's: "
             "red too light, blue too dark, full at 0.25</summary><div class=sheet>%s</div></details>"
             % (escape(group["group"], True), escape(title), plot(rows, "moving"),
                plot(rows, "kept"), table_html(rows), passes_html(rows), sheet, differences))

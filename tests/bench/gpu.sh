@@ -15,13 +15,13 @@ shift
 cd "$(dirname "$0")/../.."
 
 device=gpu
-sizes=(--triangles 70000,300000,1000000,3000000 --resolutions 1080,540,2160 --map-sizes 1024,512,2048,4096
-    --light-sizes 0.6,0.15,1.5 --lights 1,2,4 --runs 15 --warm-up 3 --seconds 1.5 --limit 200)
+sizes=(--triangles "70000,300000,1000000,3000000" --resolutions "1080,540,2160"
+    --map-sizes "1024,512,2048,4096" --light-sizes "0.6,0.15,1.5" --lights "1,2,4" --runs 15 --warm-up 3 --seconds 1.5 --limit 200)
 if [ "${1:-}" = --tiny ]; then
     shift
     device=auto
-    sizes=(--triangles 4000,16000 --resolutions 60,120 --map-sizes 256,128 --light-sizes 0.6,0.15
-        --lights 1,2 --runs 2 --warm-up 1 --seconds 0.2 --limit 60)
+    sizes=(--triangles "4000,16000" --resolutions "60,120" --map-sizes "256,128"
+        --light-sizes "0.6,0.15" --lights "1,2" --runs 2 --warm-up 1 --seconds 0.2 --limit 60)
 fi
 
 build=${PENUMBRA_BENCH_BUILD:-build/bench}

@@ -2,6 +2,7 @@
 import json
 import os
 import signal
+import socket
 import struct
 import subprocess
 import threading
@@ -192,8 +193,14 @@ class Compare(unittest.TestCase):
         self.assertEqual(missing.status, 404)
 
     def test_deadline(self):
-        problem = self.compare({**VIEW, "deadline_ms": 1}, 504)
+        problem = self.compare({**VIEW, "techniques": ["hard", "pcss"], "deadline_ms": 1}, 504)
         self.assertEqual(problem["pointer"], "/deadline_ms")
+        self.assertIn("0 of 3 images", problem["detail"])
+        # Half-way through.
+        slow = [{"name": "multisample", "params": {"samples": 1024 - n}} for n in range(20)]
+        problem = self.compare({**VIEW, "techniques": ["none"] + slow, "reference": "none",
+                                "deadline_ms": 1500}, 504)
+        self.assertRegex(problem["detail"], r"[1-9]\d* of 22 images")
         # Nothing is left behind that would keep others from being served.
         image = self.d.render(self.id, {**VIEW, "technique": "hard"})
         self.assertEqual(image.status, 200)
@@ -231,6 +238,43 @@ class Compare(unittest.TestCase):
             capture_output=True, text=True, timeout=60 * harness.SLOW)
         self.assertEqual(wrong.returncode, 3)
         self.assertIn("soft", wrong.stderr)
+
+    def test_client_without_a_folder(self):
+        """A folder that cannot be made is told before anything is rendered; pictures that the
+        server does not keep are told too."""
+        d = Daemon("--result-cache=0")
+        self.addCleanup(d.kill)
+        scene = os.path.join(d.folder, "scene.glb")
+        with open(scene, "wb") as file:
+            file.write(caster_scene())
+        command = [os.path.join(harness.BIN, "penumbra"), "compare", scene, "--server",
+                   "http://127.0.0.1:%d" % d.port, "--techniques", "hard", "--width", "32",
+                   "--height", "24", "--out"]
+        run = subprocess.run(command + [scene], capture_output=True, text=True, timeout=60)
+        self.assertEqual((run.returncode, run.stdout), (1, ""), run.stderr)
+        self.assertEqual(d.metric("penumbra_cache_misses_total"), 0)
+        out = os.path.join(d.folder, "out")
+        run = subprocess.run(command + [out], capture_output=True, text=True,
+                             timeout=60 * harness.SLOW)
+        self.assertEqual(run.returncode, 0, run.stderr)
+        self.assertIn("kept no pictures", run.stderr)
+        self.assertEqual(os.listdir(out), ["comparison.json"])
+
+    def test_client_leaves(self):
+        """When the caller hangs up, the rest is not rendered."""
+        slow = [{"name": "multisample", "params": {"samples": 1024 - n}} for n in range(20)]
+        body = json.dumps({**VIEW, "techniques": slow, "reference": "none"}).encode()
+
+        abandoned = self.d.metric("penumbra_renders_abandoned_total")
+        with socket.create_connection(("127.0.0.1", self.d.port)) as s:
+            s.sendall(b"POST /v1/scenes/%s/compare HTTP/1.1\r\nHost: x\r\nContent-Type: "
+                      b"application/json\r\nContent-Length: %d\r\n\r\n" % (
+                          self.id.encode(), len(body)) + body)
+            harness.wait(lambda: self.d.metric("penumbra_renders_running"))
+        harness.wait(lambda: self.d.metric("penumbra_renders_abandoned_total") == abandoned + 1)
+        time.sleep(0.2)
+        self.assertEqual(self.d.metric("penumbra_renders_running"), 0)
+        self.assertEqual(self.d.metric("penumbra_queue_depth"), 0)
 
     def test_worker_dies(self):
         """A measurement is given to the next worker, like any render."""

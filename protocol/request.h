@@ -55,12 +55,14 @@ struct pen_camera {
 enum pen_layer {
     PEN_LAYER_BEAUTY,
     PEN_LAYER_VISIBILITY, /* mean over lights: rgb = coloured visibility, a = mean visibility */
-    PEN_LAYER_PENUMBRA,   /* classifier: 0 lit, 1 penumbra, 2 umbra */
+    PEN_LAYER_PENUMBRA,   /* of the mean visibility: 0 lit, 1 penumbra, 2 umbra */
     PEN_LAYER_DEPTH,      /* distance along the view axis, m */
     PEN_LAYER_NORMAL,     /* world-space shading normal */
     PEN_LAYER_ALBEDO,
     PEN_LAYER_POSITION, /* world, m */
-    PEN_LAYER_ALL,      /* EXR only: all of the above in one file */
+    PEN_LAYER_CLASSES,  /* proved before: 0 lit in every light, 1 undecided, 2 umbra in every one */
+    PEN_LAYER_ERROR,    /* standard error of the mean visibility, where a method estimates it */
+    PEN_LAYER_ALL,      /* EXR only: all that the method has of the above, in one file */
     PEN_LAYERS
 };
 enum pen_format { PEN_PNG, PEN_EXR, PEN_JPEG, PEN_WEBP, PEN_TIFF, PEN_FORMATS };

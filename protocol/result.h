@@ -47,9 +47,10 @@ struct pen_result {
     struct pen_pass_time passes[PEN_MAX_PASSES];
     uint32_t scene_was_resident;
     uint32_t shadow_inputs_reused;
-    uint32_t class_pixels[3];      /* lit, penumbra, umbra; all 0 when not classified */
-    uint32_t full_work_pixels;     /* pixels for which the method ran in full */
-    uint32_t subdivided_pixels[2]; /* filter split once, twice; over all lights and frames */
+    /* Over all lights and jittered frames, and only pixels that show a surface: */
+    uint32_t class_pixels[3];      /* proved lit, undecided, in umbra; all 0 when not classified */
+    uint32_t full_work_pixels;     /* for which the method ran in full */
+    uint32_t subdivided_pixels[2]; /* filter split once, twice */
     uint32_t triangles_drawn;
     uint32_t shadow_maps; /* depth maps of light samples that the image rests on, drawn or kept;
                              summed over lights and jittered frames */

@@ -1,4 +1,5 @@
 #include "renderer/frame.h"
+#include "renderer/frame_layers.h"
 #include "renderer/frame_output.h"
 #include "renderer/passes/passes.h"
 #include <cglm/cglm.h>
@@ -29,7 +30,9 @@ struct frame {
     GLuint view_buffer;
     struct pen_result *result;
     uint64_t triangles;
+    bool classified; /* at least one light of one frame */
     uint32_t number; /* of the jittered frame */
+    struct frame_work work;
 };
 
 static void release(GLuint *framebuffer, struct gl_texture *texture)
@@ -54,6 +57,8 @@ void frame_targets_finish(struct frame_targets *t)
     release(&t->color_framebuffer, &t->color);
     release(&t->beauty_framebuffer, &t->beauty_sum);
     release(&t->vis_sum_framebuffer, &t->vis_sum);
+    release(&t->classes.framebuffer, &t->classes.sum);
+    release(&t->variance.framebuffer, &t->variance.sum);
     memset(t, 0, sizeof *t);
 }
 
@@ -161,10 +166,11 @@ static bool resolve_emissions(struct frame *f, struct pen_error *error)
     return true;
 }
 
-static bool record_face(
-    struct frame *f, uint32_t light, struct light_face *face, struct pen_error *error)
+static bool record_face(struct frame *f, uint32_t light, uint32_t number,
+    const struct gl_texture **tiles, bool *counted, struct pen_error *error)
 {
     const struct frame_job *job = f->job;
+    struct light_face *face = &f->lights[light].faces[number];
     struct technique_ctx *ctx = job->ctx;
     glm_mat4_mul(face->world_to_light, f->view.clip_to_world, face->clip_to_light);
     gl.NamedBufferData(ctx->light_block, sizeof *face, face, GL_STREAM_DRAW);
@@ -186,8 +192,31 @@ static bool record_face(
         .result = f->result,
         .width = job->request->width,
         .height = job->request->height,
-        .frame = f->number};
-    return job->technique->record(&run, error);
+        .frame = f->number,
+        .light_index = light,
+        .variance_framebuffer = frame_layers_want_error(job->request, job->technique)
+                                    ? job->targets->variance.framebuffer
+                                    : 0};
+    if (!job->technique->record(&run, error))
+        return false;
+    *tiles = run.tiles;
+    *counted |= run.work_counted;
+    return true;
+}
+
+static bool record_light(struct frame *f, uint32_t light, struct pen_error *error)
+{
+    const struct frame_job *job = f->job;
+    const struct gl_texture *tiles = NULL;
+    bool counted = false;
+    for (uint32_t k = 0; k < f->lights[light].face_count; k++)
+        if (!record_face(f, light, k, &tiles, &counted, error))
+            return false;
+    f->work.lights[f->number] += !counted;
+    f->classified |= tiles != NULL;
+    /* The faces of a cube cut through tiles: nothing is proved there. */
+    return !frame_layers_want_classes(job->request) ||
+           frame_layers_add_classes(job, f->lights[light].face_count == 1 ? tiles : NULL, error);
 }
 
 static bool record_visibility(struct frame *f, struct pen_error *error)
@@ -198,11 +227,11 @@ static bool record_visibility(struct frame *f, struct pen_error *error)
     for (uint32_t i = 0; i < f->light_count; i++) {
         gl.ClearNamedFramebufferfv(job->targets->vis_framebuffers[i], GL_COLOR, 0,
             f->lights[i].faces[0].emission_mean); /* what an unshadowed receiver sees */
-        for (uint32_t k = 0; k < f->lights[i].face_count; k++)
-            if (!record_face(f, i, &f->lights[i].faces[k], error))
-                return false;
+        if (!record_light(f, i, error))
+            return false;
     }
-    return true;
+    return !f->work.lights[f->number] ||
+           frame_layers_count_receivers(job, f->number, &f->work, error);
 }
 
 static void scale3(float out[4], const float v[3], float factor, float w)
@@ -297,7 +326,7 @@ static bool render_jittered(struct frame *f, uint32_t number, struct pen_error *
     upload_view(f, number);
     return pass_gbuffer(f->job->ctx, f->job->scene, &f->view, r->ground.on,
                &f->job->targets->gbuffer, &f->triangles, error) &&
-           (!(beauty || visibility) || record_visibility(f, error)) &&
+           (!frame_output_needs_shadows(r) || record_visibility(f, error)) &&
            (!beauty || shade(f, error)) && (!visibility || add_visibility(f, error));
 }
 
@@ -320,6 +349,7 @@ bool frame_render(const struct frame_job *job, struct pen_frame *frame, struct p
     if (!resolve_emissions(&f, error))
         return false;
     fit_targets(&f);
+    frame_layers_begin(job, result);
     gl.CreateBuffers(1, &f.view_buffer);
     for (uint32_t i = 0; i < r->antialias; i++) {
         float x = 0, y = 0;
@@ -332,6 +362,7 @@ bool frame_render(const struct frame_job *job, struct pen_frame *frame, struct p
     }
     if (!frame_output_read(job, &f.view, frame, error))
         goto done;
+    frame_layers_end(job, &f.work, f.classified, result);
     gl_timer_collect(&job->ctx->timer, result);
     result->shadow_inputs_reused = shadow_cache_all_reused(job->ctx->shadows);
     result->triangles_drawn = (uint32_t)f.triangles;
@@ -340,5 +371,6 @@ done:
     if (job->technique->finish)
         job->technique->finish(job->ctx, job->technique_state, result);
     gl.DeleteBuffers(1, &f.view_buffer);
+    gl.DeleteQueries(PEN_MAX_ANTIALIAS, f.work.queries);
     return ok;
 }

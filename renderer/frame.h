@@ -6,12 +6,20 @@
 
 #define FRAME_VIS_LIGHTS PEN_MAX_LIGHTS
 
+/* An accumulator over lights and jittered frames. */
+struct frame_layer {
+    struct gl_texture sum;
+    GLuint framebuffer;
+};
+
 struct frame_targets {
     struct gbuffer gbuffer;
     struct gl_texture vis; /* RGBA16F array, a layer per light */
     GLuint vis_framebuffers[FRAME_VIS_LIGHTS];
     struct gl_texture color, beauty_sum, vis_sum;
     GLuint color_framebuffer, beauty_framebuffer, vis_sum_framebuffer;
+    struct frame_layer classes;  /* RG16F: times proved lit, in umbra */
+    struct frame_layer variance; /* R32F: sum of the squared standard errors */
 };
 void frame_targets_finish(struct frame_targets *targets);
 

@@ -1,4 +1,5 @@
 #include "renderer/frame_output.h"
+#include "renderer/frame_layers.h"
 #include "renderer/passes/passes.h"
 #include <math.h>
 #include <stdio.h>
@@ -14,6 +15,12 @@ bool frame_output_needs_visibility(const struct pen_request *r)
 {
     return r->output.layer == PEN_LAYER_VISIBILITY || r->output.layer == PEN_LAYER_PENUMBRA ||
            r->output.layer == PEN_LAYER_ALL;
+}
+
+bool frame_output_needs_shadows(const struct pen_request *r)
+{
+    return frame_output_needs_beauty(r) || frame_output_needs_visibility(r) ||
+           r->output.layer == PEN_LAYER_CLASSES || r->output.layer == PEN_LAYER_ERROR;
 }
 
 static enum pen_pixel pixel_of(const struct pen_output *output, uint32_t layer)
@@ -52,7 +59,7 @@ void frame_output_fit(struct frame_targets *t, const struct pen_request *r)
 }
 
 struct output_block {
-    float bounds_min[4], bounds_max[4];
+    float bounds_min[4], bounds_max[4], shadings[4];
 };
 
 static void make_block(const struct frame_job *job, const struct view *view, struct output_block *b)
@@ -61,6 +68,7 @@ static void make_block(const struct frame_job *job, const struct view *view, str
     scene_center(job->scene, center);
     const struct psc_header *h = job->scene->blob.header;
     bool empty = scene_is_empty(job->scene);
+    b->shadings[0] = (float)(job->request->light_count * job->request->antialias);
     for (int i = 0; i < 3; i++) {
         b->bounds_min[i] = empty ? -1 : h->bounds_min[i];
         b->bounds_max[i] = empty ? 1 : h->bounds_max[i];
@@ -77,11 +85,13 @@ static bool convert(const struct frame_job *job, const struct output_block *bloc
     struct frame_targets *t = job->targets;
     char defines[64];
     snprintf(defines, sizeof defines, "#define LAYER %u\n%s", layer, raw ? "#define RAW\n" : "");
-    bool beauty = layer == PEN_LAYER_BEAUTY;
+    const struct gl_texture *accumulated = layer == PEN_LAYER_BEAUTY    ? &t->beauty_sum
+                                           : layer == PEN_LAYER_CLASSES ? &t->classes.sum
+                                           : layer == PEN_LAYER_ERROR   ? &t->variance.sum
+                                                                        : &t->vis_sum;
     struct pass_texture textures[] = {{0, t->gbuffer.depth.name, GL_SAMPLE_NEAREST},
         {1, t->gbuffer.normal.name, GL_SAMPLE_NEAREST},
-        {2, t->gbuffer.albedo.name, GL_SAMPLE_NEAREST},
-        {7, beauty ? t->beauty_sum.name : t->vis_sum.name, GL_SAMPLE_NEAREST}};
+        {2, t->gbuffer.albedo.name, GL_SAMPLE_NEAREST}, {7, accumulated->name, GL_SAMPLE_NEAREST}};
     return pass_fill(job->ctx,
         &(struct pass_fill){.name = "output",
             .fragment = "output.frag",
@@ -97,15 +107,28 @@ static bool convert(const struct frame_job *job, const struct output_block *bloc
         error);
 }
 
+static uint32_t channels_of(uint32_t layer, enum pen_pixel pixel)
+{
+    switch (layer) {
+    case PEN_LAYER_DEPTH:
+    case PEN_LAYER_PENUMBRA:
+    case PEN_LAYER_CLASSES:
+    case PEN_LAYER_ERROR:
+        return 1;
+    case PEN_LAYER_VISIBILITY:
+        return pixel == PEN_PIXEL_RGBA8 ? 3 : 4;
+    default:
+        return 3;
+    }
+}
+
 static void read_plane(
     const struct frame_job *job, enum pen_pixel pixel, uint32_t layer, struct pen_frame *frame)
 {
     struct pen_plane *plane = &frame->planes[frame->plane_count++];
     snprintf(plane->name, sizeof plane->name, "%s", pen_layer_names[layer]);
     plane->pixel = pixel;
-    plane->channels = layer == PEN_LAYER_DEPTH || layer == PEN_LAYER_PENUMBRA     ? 1
-                      : layer == PEN_LAYER_VISIBILITY && pixel != PEN_PIXEL_RGBA8 ? 4
-                                                                                  : 3;
+    plane->channels = channels_of(layer, pixel);
     plane->data = malloc((size_t)frame->width * frame->height * pixel_bytes[pixel]);
     if (!plane->data)
         abort();
@@ -122,12 +145,13 @@ bool frame_output_read(const struct frame_job *job, const struct view *view,
 {
     const struct pen_request *r = job->request;
     bool raw = r->output.format == PEN_EXR;
-    struct output_block block;
+    struct output_block block = {0};
     memset(frame, 0, sizeof *frame);
     frame->width = r->width, frame->height = r->height;
     make_block(job, view, &block);
     for (uint32_t layer = 0; layer < PEN_LAYER_ALL; layer++) {
-        if (r->output.layer != PEN_LAYER_ALL && r->output.layer != layer)
+        bool has = layer != PEN_LAYER_ERROR || frame_layers_want_error(r, job->technique);
+        if (r->output.layer == PEN_LAYER_ALL ? !has : r->output.layer != layer)
             continue;
         enum pen_pixel pixel = pixel_of(&r->output, layer);
         if (!frame_output_is_direct(r))

@@ -5,6 +5,8 @@
 /* What the output needs to have been accumulated. */
 bool frame_output_needs_beauty(const struct pen_request *request);
 bool frame_output_needs_visibility(const struct pen_request *request);
+/* True when the method has to run at all. */
+bool frame_output_needs_shadows(const struct pen_request *request);
 /* True when one 8-bit beauty image of one frame is all that is wanted: shading then resolves. */
 bool frame_output_is_direct(const struct pen_request *request);
 

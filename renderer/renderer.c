@@ -63,6 +63,7 @@ struct pen_renderer *pen_renderer_create(
         return NULL;
     }
     r->budget = config->gpu_memory_bytes ? config->gpu_memory_bytes : 1ull << 30;
+    r->ctx.gpu_memory = r->budget;
     r->ctx.shadow_memory = r->budget / 2;
     r->ctx.programs = gl_programs_create();
     r->ctx.shadows = shadow_cache_create();
@@ -313,10 +314,11 @@ static void warm_scene(struct pen_renderer *r, uint32_t kind)
             memset(request.technique_params, 0, sizeof request.technique_params);
             pen_params_default(catalogue->items[i]->params, request.technique_params);
             request.width = 64, request.height = 48;
-            /* Programs do not depend on the number of light samples; the time does. */
+            /* Programs do not depend on the number of light samples; the time does. Rays want more
+             * than those of their pre-test, or it is left out. */
             const struct pen_param *samples =
                 pen_param_find(catalogue->items[i]->params, "samples");
-            double few = 16;
+            double few = 32;
             if (samples && samples->min <= few && samples->max >= few)
                 pen_param_store(samples, request.technique_params, &few, "", NULL);
             if (pen_renderer_render(r, &request, &frame, &result, NULL))

@@ -283,6 +283,8 @@ void scene_destroy(struct scene *s)
         return;
     if (s->trace_free)
         s->trace_free(s->trace);
+    if (s->rays_free)
+        s->rays_free(s->rays);
     GLuint buffers[] = {
         s->positions, s->attributes, s->indices, s->instances, s->materials, s->commands};
     gl.DeleteBuffers(sizeof buffers / sizeof *buffers, buffers);

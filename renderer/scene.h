@@ -31,6 +31,8 @@ struct scene {
     uint64_t last_use;
     void *trace; /* owned by the tracer when there is one; freed through trace_free */
     void (*trace_free)(void *);
+    void *rays; /* of passes/ray_scene.c, in GPU memory; freed through rays_free */
+    void (*rays_free)(void *);
 };
 
 /* Uploads the blob behind `fd`. Errors as psc_open; PEN_INTERNAL out of GPU memory. */

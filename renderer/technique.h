@@ -33,6 +33,7 @@ struct technique_ctx {
     struct gl_texture sum;            /* RGBA32F accumulator of methods that add passes */
     GLuint sum_framebuffer;
     struct gl_texture scratch[12]; /* of passes/scratch.c */
+    uint64_t gpu_memory;           /* the budget of everything, bytes */
     uint64_t shadow_memory;        /* bytes that kept shadow inputs of a frame may take together */
     uint64_t shadow_budget; /* the share of one face of one light in it; set for every frame */
 };
@@ -63,11 +64,19 @@ struct technique_run {
     struct pen_result *result;         /* warnings and counts */
     uint32_t width, height;            /* px of vis and G-buffer */
     uint32_t frame;                    /* number of the jittered frame */
+    uint32_t light_index;              /* of the request */
+    /* R32F, or 0: nobody asks. A method that estimates its error adds the square of the standard
+     * error of vis.a here, by blending. */
+    GLuint variance_framebuffer;
+    /* What record tells the frame: */
+    const struct gl_texture *tiles; /* classes, of pass_classify; NULL: not classified */
+    bool work_counted; /* result->full_work_pixels has this light; else every receiver counts */
 };
 
 struct technique {
     struct pen_technique_info info;
     size_t state_size;
+    bool estimates_error; /* fills technique_run.variance_framebuffer */
     bool (*create)(struct technique_ctx *, void *state, struct pen_error *); /* optional */
     bool (*record)(struct technique_run *, struct pen_error *);
     /* Optional: all frames of an image are recorded (or failed); counts go into the result. */

@@ -55,7 +55,7 @@
     F(PROGRAMUNIFORM2I, ProgramUniform2i) F(PROGRAMUNIFORM2FV, ProgramUniform2fv) \
     F(PROGRAMUNIFORM3F, ProgramUniform3f) \
     F(PROGRAMUNIFORM4F, ProgramUniform4f) F(PROGRAMUNIFORM4FV, ProgramUniform4fv) \
-    F(PROGRAMUNIFORM4I, ProgramUniform4i) \
+    F(PROGRAMUNIFORM4I, ProgramUniform4i) F(PROGRAMUNIFORM4UI, ProgramUniform4ui) \
     F(PROGRAMUNIFORMMATRIX4FV, ProgramUniformMatrix4fv) F(QUERYCOUNTER, QueryCounter) \
     F(READPIXELS, ReadPixels) F(SAMPLERPARAMETERF, SamplerParameterf) \
     F(SAMPLERPARAMETERFV, SamplerParameterfv) F(SAMPLERPARAMETERI, SamplerParameteri) \

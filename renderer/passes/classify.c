@@ -6,25 +6,23 @@ struct classify_block {
     int32_t tile[4];
 };
 
-/* Adds up the classes of the tiles, in pixels. Reads 1 byte per 64 pixels back. */
+/* Adds up the receivers of each class. Reads 2 bytes per 64 pixels back. */
 static void count_classes(struct technique_run *run, const struct gl_texture *tiles)
 {
     uint32_t n = tiles->width * tiles->height;
-    uint8_t *classes = malloc(n);
-    if (!classes)
+    uint8_t(*found)[2] = malloc(2 * n); /* class, receivers */
+    if (!found)
         abort();
     gl.PixelStorei(GL_PACK_ALIGNMENT, 1);
-    gl.GetTextureImage(tiles->name, 0, GL_RED, GL_UNSIGNED_BYTE, (GLsizei)n, classes);
+    gl.GetTextureImage(tiles->name, 0, GL_RG, GL_UNSIGNED_BYTE, (GLsizei)(2 * n), found);
     for (uint32_t i = 0; i < n; i++) {
-        uint32_t x = i % tiles->width * CLASSIFY_TILE, y = i / tiles->width * CLASSIFY_TILE;
-        uint32_t w = run->width - x < CLASSIFY_TILE ? run->width - x : CLASSIFY_TILE;
-        uint32_t h = run->height - y < CLASSIFY_TILE ? run->height - y : CLASSIFY_TILE;
-        if (classes[i] < TILE_EMPTY)
-            run->result->class_pixels[classes[i]] += w * h;
-        if (classes[i] == TILE_UNDECIDED)
-            run->result->full_work_pixels += w * h;
+        if (found[i][0] < TILE_EMPTY)
+            run->result->class_pixels[found[i][0]] += found[i][1];
+        if (found[i][0] == TILE_UNDECIDED)
+            run->result->full_work_pixels += found[i][1];
     }
-    free(classes);
+    free(found);
+    run->work_counted = true;
 }
 
 bool pass_fill_umbra(struct technique_run *run, const struct gl_texture *tiles, GLuint framebuffer,
@@ -42,29 +40,31 @@ bool pass_fill_umbra(struct technique_run *run, const struct gl_texture *tiles, 
 }
 
 static const struct gl_texture *classify(struct technique_run *run,
-    const struct shadow_input *casters, float margin_texels, bool umbra, struct pen_error *error)
+    const struct shadow_input *casters, float margin_texels, float margin_pixels, bool umbra,
+    struct pen_error *error)
 {
     struct technique_ctx *ctx = run->ctx;
     struct gl_texture *tiles = &ctx->tiles;
     uint32_t width = (run->width + CLASSIFY_TILE - 1) / CLASSIFY_TILE;
     uint32_t height = (run->height + CLASSIFY_TILE - 1) / CLASSIFY_TILE;
-    if (gl_texture_fit(tiles, GL_R8, width, height, 0, 1) || !ctx->tiles_framebuffer) {
+    if (gl_texture_fit(tiles, GL_RG8, width, height, 0, 1) || !ctx->tiles_framebuffer) {
         gl.DeleteFramebuffers(1, &ctx->tiles_framebuffer);
         const struct gl_texture *color = tiles;
         ctx->tiles_framebuffer = gl_framebuffer_create(&color, 1, NULL);
     }
     /* Spheres' far sides and textured lights need no zero tiles of their own: 0 is 0 in any colour;
      * but an omnidirectional light lights what lies behind its plane. */
-    struct classify_block block = {
-        .margin = {margin_texels + 1}, .tile = {CLASSIFY_TILE, umbra && !run->face->omni ? 1 : 0}};
+    struct classify_block block = {.margin = {margin_texels + 1, margin_pixels},
+        .tile = {CLASSIFY_TILE, umbra && !run->face->omni ? 1 : 0}};
     struct pass_texture textures[] = {{UNIT_DEPTH, run->gbuffer->depth.name, GL_SAMPLE_NEAREST},
+        {UNIT_NORMAL, run->gbuffer->normal.name, GL_SAMPLE_NEAREST},
         {UNIT_MIN_MAX, casters->textures[0].name, GL_SAMPLE_NEAREST}};
     if (!pass_fill(ctx,
             &(struct pass_fill){.name = "classify",
                 .fragment = "classify.frag",
                 .stage = PEN_STAGE_TECHNIQUE,
                 .textures = textures,
-                .texture_count = 2,
+                .texture_count = 3,
                 .framebuffer = ctx->tiles_framebuffer,
                 .width = width,
                 .height = height,
@@ -73,18 +73,32 @@ static const struct gl_texture *classify(struct technique_run *run,
             error) ||
         !pass_fill_umbra(run, tiles, run->vis_framebuffer, error))
         return NULL;
-    count_classes(run, tiles);
-    return tiles;
+    /* All faces of a cube see all receivers here, and each leaves every tile undecided. */
+    if (run->face == &run->light->faces[0])
+        count_classes(run, tiles);
+    return run->tiles = tiles;
 }
 
 const struct gl_texture *pass_classify(struct technique_run *run,
     const struct shadow_input *casters, float margin_texels, struct pen_error *error)
 {
-    return classify(run, casters, margin_texels, true, error);
+    return classify(run, casters, margin_texels, 0, true, error);
 }
 
 const struct gl_texture *pass_classify_lit(struct technique_run *run,
     const struct shadow_input *casters, float margin_texels, struct pen_error *error)
 {
-    return classify(run, casters, margin_texels, false, error);
+    return classify(run, casters, margin_texels, 0, false, error);
+}
+
+bool pass_lit_tiles(struct technique_run *run, uint32_t map_size, float margin_texels,
+    float margin_pixels, const struct gl_texture **tiles, struct pen_error *error)
+{
+    *tiles = NULL;
+    if (!run->request->classify.on)
+        return true;
+    const struct shadow_input *casters = pass_caster_min_max(run, map_size, error);
+    if (casters)
+        *tiles = classify(run, casters, margin_texels, margin_pixels, false, error);
+    return *tiles != NULL;
 }

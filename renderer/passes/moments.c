@@ -1,5 +1,6 @@
 #include "renderer/passes/moments.h"
 #include "renderer/passes/blur.h"
+#include "renderer/passes/classify.h"
 #include <string.h>
 
 enum { KEY_KIND, KEY_BLUR, KEY_EXPONENTS };
@@ -46,4 +47,12 @@ const struct shadow_input *pass_moments(
     key.extra[KEY_BLUR] = map->blur;
     memcpy(&key.extra[KEY_EXPONENTS], map->exponents, sizeof map->exponents);
     return shadow_cache_get(run, &key, build, error);
+}
+
+bool pass_moment_tiles(struct technique_run *run, const struct moment_map *map,
+    const struct gl_texture **tiles, struct pen_error *error)
+{
+    /* The kernel, and one and a half texels of the coarser level, which are at most twice as large
+     * as the pixel. */
+    return pass_lit_tiles(run, map->size, (float)map->blur + 1.5f, 3, tiles, error);
 }

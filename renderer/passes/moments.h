@@ -20,3 +20,7 @@ struct moment_map {
 /* The map with its mip chain in textures[0]. Kept between requests. */
 const struct shadow_input *pass_moments(
     struct technique_run *run, const struct moment_map *map, struct pen_error *error);
+
+/* pass_lit_tiles for a lookup in that map (moment_lookup.glsl). */
+bool pass_moment_tiles(struct technique_run *run, const struct moment_map *map,
+    const struct gl_texture **tiles, struct pen_error *error);

@@ -3,22 +3,51 @@
 #include "surface.glsl"
 #include "min_max.glsl"
 layout(std140, binding = 3) uniform ClassifyBlock {
-    vec4 margin; // x: texels of the full map
+    vec4 margin; // x: texels of the full map, y: pixels of the image
     ivec4 tile;  // x: px
 } classify;
-layout(location = 0) out vec4 tile_class; // class / 255
+layout(location = 0) out vec4 tile_class; // class / 255, receivers / 255
 
 const float LIT = 0.0, UNDECIDED = 1.0, UMBRA = 2.0, EMPTY = 3.0;
 
-float classify_tile(ivec2 first, ivec2 size)
+// Whether all of the emitter is above the horizon of every receiver of the tile. What turns away from
+// it may be thin or leave no depth in the map, and still sees nothing of the light. `low`, `high`:
+// bounds of the receivers.
+bool all_face_light(ivec2 first, ivec2 end, vec3 low, vec3 high)
+{
+    // Most such tiles are flat: one normal, at the worst corner of the bounds.
+    vec2 least = vec2(2.0), most = vec2(-1.0);
+    for (int y = first.y; y < end.y; y++)
+        for (int x = first.x; x < end.x; x++) {
+            vec2 e = texelFetch(g_normal, ivec2(x, y), 0).xy;
+            least = min(least, e);
+            most = max(most, e);
+        }
+    vec3 n = mat3(light.world_to_light) * octahedral_decode(least);
+    vec3 worst = mix(low, high, greaterThan(n, vec3(0.0)));
+    if (least == most && light_is_wholly_above_horizon(worst, n))
+        return true;
+    bool facing = true;
+    for (int y = first.y; y < end.y && facing; y++)
+        for (int x = first.x; x < end.x; x++) {
+            float d = texelFetch(g_depth, ivec2(x, y), 0).r;
+            Surface s = surface_at(ivec2(x, y), max(d, 1e-20));
+            facing = facing && (d == 0.0 || light_is_wholly_above_horizon(s.p, s.n));
+        }
+    return facing;
+}
+
+float classify_tile(ivec2 first, ivec2 size, out int receivers)
 {
     ivec2 end = min(first + classify.tile.x, size);
     float low = 1e30, high = 0.0;
+    receivers = 0;
     for (int y = first.y; y < end.y; y++)
         for (int x = first.x; x < end.x; x++) {
             float d = texelFetch(g_depth, ivec2(x, y), 0).r;
             low = min(low, d == 0.0 ? low : d);
             high = max(high, d);
+            receivers += d == 0.0 ? 0 : 1;
         }
     if (high == 0.0)
         return EMPTY;
@@ -26,23 +55,26 @@ float classify_tile(ivec2 first, ivec2 size)
     vec2 ndc_low = pixel_to_ndc(first) - vec2(1.0, -1.0) * view.viewport.zw;
     vec2 ndc_high = pixel_to_ndc(end - 1) + vec2(1.0, -1.0) * view.viewport.zw;
     vec2 q_low = vec2(1e30), q_high = vec2(-1e30);
-    float near_z = 1e30, far_z = -1e30;
+    vec3 p_low = vec3(1e30), p_high = vec3(-1e30);
     for (int i = 0; i < 8; i++) {
         vec2 ndc = vec2((i & 1) != 0 ? ndc_high.x : ndc_low.x, (i & 2) != 0 ? ndc_high.y : ndc_low.y);
         vec3 p = unproject(light.clip_to_light, ndc, (i & 4) != 0 ? high : low);
-        near_z = min(near_z, p.z);
-        far_z = max(far_z, p.z);
+        p_low = min(p_low, p);
+        p_high = max(p_high, p);
         if (light.parallel == 0 && p.z <= light.near_z)
             return UNDECIDED; // beside or behind the light: nothing to project
         vec2 q = light_project(p);
         q_low = min(q_low, q);
         q_high = max(q_high, q);
     }
+    float near_z = p_low.z, far_z = p_high.z;
     // A cube face only owns receivers inside its pyramid.
     if (light.cube != 0)
         return UNDECIDED;
     vec2 texel = (light.rect.zw - light.rect.xy) / vec2(2 * textureSize(min_max_pyramid, 0));
     vec2 center = 0.5 * (q_low + q_high), spread = 0.5 * (q_high - q_low) + classify.margin.x * texel;
+    float pixel = view.forward.w / (low * view.eye.w); // m, of the farthest receiver
+    spread += classify.margin.y * pixel * (light.parallel != 0 ? 1.0 : light.near_z / near_z);
     vec2 search = light_search_extent(far_z) + spread;
     float slack = 1e-4 * far_z;
 
@@ -73,7 +105,7 @@ float classify_tile(ivec2 first, ivec2 size)
             }
         }
     if (!blocked)
-        return LIT;
+        return all_face_light(first, end, p_low, p_high) ? LIT : UNDECIDED;
     // In umbra every texel of every window blocks: the windows must not reach over the map's border,
     // where nothing is, and lie wholly in front of the nearest receiver.
     vec2 window = reach + spread;
@@ -86,5 +118,7 @@ float classify_tile(ivec2 first, ivec2 size)
 void main()
 {
     ivec2 size = ivec2(view.viewport.xy);
-    tile_class = vec4(classify_tile(ivec2(gl_FragCoord.xy) * classify.tile.x, size) / 255.0);
+    int receivers;
+    float found = classify_tile(ivec2(gl_FragCoord.xy) * classify.tile.x, size, receivers);
+    tile_class = vec4(found, float(receivers), 0.0, 0.0) / 255.0;
 }

@@ -1,11 +1,16 @@
 // Irradiance at p (normal n) of emitters of unit radiance, all in world space, in closed form.
 
-// Angle over sine of an edge whose ends have this cosine: least-squares polynomial, error 1.6e-4 of
-// the factor, and exact relative to 2e-4 for lights of any size since it multiplies every edge.
+// Angle over sine of an edge whose ends have this cosine, for angles up to 90 degrees: least-squares
+// polynomial, error 1.6e-4 of the factor, and exact relative to 2e-4 for lights of any size since it
+// multiplies every edge.
+float angle_over_sine_acute(float x)
+{
+    return 1.5706395 + x * (-0.9914837 + x * (0.7078825 + x * (-0.3954492 + x * 0.1085248)));
+}
+
 float angle_over_sine(float cosine)
 {
-    float x = abs(cosine);
-    float f = 1.5706395 + x * (-0.9914837 + x * (0.7078825 + x * (-0.3954492 + x * 0.1085248)));
+    float x = abs(cosine), f = angle_over_sine_acute(x);
     return cosine >= 0.0 ? f : 3.14159265 * inversesqrt(max(1.0 - x * x, 1e-7)) - f;
 }
 
@@ -29,18 +34,41 @@ float clipped_edge(vec3 a, vec3 b, float da, float db, vec3 n, inout vec3 leave,
     return max(da, db) < 0.0 ? 0.0 : e;
 }
 
+// Most receivers see the whole rectangle above their horizon and its edges under less than 90 degrees.
+// Opposite edges then share their plane's normal, all dot products are linear in the corner's signs,
+// and Lambert's formula needs four roots. The rest goes edge by edge: software rasterisers run the
+// first round of a loop, like both sides of a branch, for all pixels, but no more than that where none
+// needs it. The fifth edge closes the cut along the horizon.
 float irradiance_rect(vec3 p, vec3 n, vec3 center, vec3 half_x, vec3 half_y)
 {
-    vec3 to = center - p;
-    vec3 a = to - half_x - half_y, b = to + half_x - half_y;
-    vec3 c = to + half_x + half_y, d = to - half_x + half_y;
-    vec4 above = vec4(dot(a, n), dot(b, n), dot(c, n), dot(d, n));
+    vec3 to = center - p, nx = cross(half_x, n), ny = cross(half_y, n);
+    vec2 size2 = vec2(dot(half_x, half_x), dot(half_y, half_y));
+    vec4 length2 = dot(to, to) + size2.x + size2.y +
+        2.0 * dot(to, half_x) * vec4(-1.0, 1.0, 1.0, -1.0) +
+        2.0 * dot(to, half_y) * vec4(-1.0, -1.0, 1.0, 1.0); // of corners a, b, c, d
+    vec4 inverse = inversesqrt(max(length2, 1e-30));
+    // Cosines of the edges ab, bc, cd, da, times both lengths.
+    vec4 products = 0.5 * (length2 + length2.yzwx) - 2.0 * size2.xyxy;
+    float turn = dot(cross(half_x, half_y), n);
+    vec4 moments = 2.0 * (vec4(1.0, 1.0, -1.0, -1.0) * vec2(dot(to, nx), dot(to, ny)).xyxy + turn);
+    vec4 roots = inverse * inverse.yzwx, sum = vec4(0.0);
+    for (int i = 0; i < 4; i++)
+        sum[i] = moments[i] * roots[i] * angle_over_sine_acute(min(products[i] * roots[i], 1.0));
+    float e = 0.5 * abs(sum.x + sum.y + sum.z + sum.w);
+    float lowest = dot(to, n) - abs(dot(half_x, n)) - abs(dot(half_y, n));
+    int edges = lowest < 0.0 || any(lessThan(products, vec4(0.0))) ? 5 : 0;
     vec3 leave = vec3(0.0), enter = vec3(0.0);
-    float sum = clipped_edge(a, b, above.x, above.y, n, leave, enter) +
-        clipped_edge(b, c, above.y, above.z, n, leave, enter) +
-        clipped_edge(c, d, above.z, above.w, n, leave, enter) +
-        clipped_edge(d, a, above.w, above.x, n, leave, enter);
-    return 0.5 * abs(sum + edge_integral(leave, enter, n)); // the cut closes along the horizon
+    float clipped = 0.0;
+    vec2 from = vec2(-1.0);
+    for (int i = 0; i < edges; i++) {
+        vec2 next = vec2(-from.y, from.x);
+        vec3 a = i == 4 ? leave : to + from.x * half_x + from.y * half_y;
+        vec3 b = i == 4 ? enter : to + next.x * half_x + next.y * half_y;
+        float above_a = i == 4 ? 0.0 : dot(a, n), above_b = i == 4 ? 0.0 : dot(b, n);
+        clipped += clipped_edge(a, b, above_a, above_b, n, leave, enter);
+        from = next;
+    }
+    return edges > 0 ? 0.5 * abs(clipped) : e;
 }
 
 // A disk as the regular polygon of the same area.

@@ -119,11 +119,20 @@ float plane_depth(ReceiverPlane plane, vec2 offset, float bias)
 }
 
 // True when some point of the emitter lies above the receiver's horizon.
-bool light_is_above_horizon(vec3 p, vec3 n)
+float light_reach_along(vec3 n) // from the centre to the point that is farthest along n
 {
     vec2 across = abs(n.xy) * light.extent;
-    float reach = light_shape == SHAPE_DISK ? light.extent.x * length(n.xy) : across.x + across.y;
-    return (light_parallel ? -n.z : -dot(n, p)) + reach > 0.0;
+    return light_shape == SHAPE_DISK ? light.extent.x * length(n.xy) : across.x + across.y;
+}
+
+bool light_is_above_horizon(vec3 p, vec3 n)
+{
+    return (light_parallel ? -n.z : -dot(n, p)) + light_reach_along(n) > 0.0;
+}
+
+bool light_is_wholly_above_horizon(vec3 p, vec3 n)
+{
+    return (light_parallel ? -n.z : -dot(n, p)) - light_reach_along(n) > 0.0;
 }
 
 // Emission at emitter position s in [-1, 1]^2, averaged over a square of `size` (2: all of it). The

@@ -7,10 +7,11 @@
 layout(binding = 0) uniform sampler2D g_depth;
 layout(binding = 1) uniform sampler2D g_normal;
 layout(binding = 2) uniform sampler2D g_albedo;
-layout(binding = 7) uniform sampler2D accumulated; // beauty or visibility sum
+layout(binding = 7) uniform sampler2D accumulated; // sum of beauty, visibility, classes, variance
 layout(std140, binding = 3) uniform OutputBlock {
     vec4 bounds_min; // world; w: nearest view distance shown
     vec4 bounds_max; // w: farthest
+    vec4 shadings;   // x: lights times frames
 } range;
 
 layout(location = 0) out vec4 color;
@@ -61,6 +62,23 @@ void main()
     color = vec4(albedo, 1.0);
 #else
     color = vec4(srgb_encode(albedo), 1.0);
+#endif
+#elif LAYER == 7
+    // Proved lit 0 or in umbra 2 in every light and frame; else undecided 1.
+    vec2 proved = texelFetch(accumulated, pixel, 0).rg;
+    float kind = proved.x >= range.shadings.x ? 0.0 : proved.y >= range.shadings.x ? 2.0 : 1.0;
+#ifdef RAW
+    color = vec4(vec3(kind), 1.0);
+#else
+    color = vec4(vec3(0.5 * kind), 1.0);
+#endif
+#elif LAYER == 8
+    // Standard error of a mean of independent estimates.
+    float error = sqrt(texelFetch(accumulated, pixel, 0).r) / max(range.shadings.x, 1.0);
+#ifdef RAW
+    color = vec4(vec3(error), 1.0);
+#else
+    color = vec4(vec3(min(10.0 * error, 1.0)), 1.0);
 #endif
 #else
 #ifdef RAW

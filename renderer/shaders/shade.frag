@@ -34,24 +34,23 @@ struct Material {
     float alpha; // squared roughness
 };
 
-// GGX with height-correlated Smith visibility and Schlick's Fresnel term, as glTF 2.0 appendix B.
-// `spread` widens the lobe by the solid angle that one light sample stands for.
-vec3 specular_brdf(Material m, vec3 n, vec3 v, vec3 l, float spread)
+// GGX with height-correlated Smith visibility and Schlick's Fresnel term, as glTF 2.0 appendix B, times
+// nl; out of the cosines alone, since |v + l|^2 = 2 + 2 vl. `a` is the squared roughness.
+vec3 specular_brdf(vec3 f0, float a, float nv, float nl, float vl)
 {
-    vec3 h = normalize(v + l);
-    float nl = max(dot(n, l), 0.0), nv = max(dot(n, v), 1e-3), nh = max(dot(n, h), 0.0);
-    float a = m.alpha + spread, a2 = a * a;
+    float h = inversesqrt(max(2.0 + 2.0 * vl, 1e-6));
+    float nh = min((nl + nv) * h, 1.0), vh = (1.0 + vl) * h, a2 = a * a;
     float t = nh * nh * (a2 - 1.0) + 1.0;
-    float d = a2 / (3.14159265 * t * t);
-    float smith = 0.5 / (nl * sqrt(nv * nv * (1.0 - a2) + a2) + nv * sqrt(nl * nl * (1.0 - a2) + a2));
-    float f = pow(1.0 - max(dot(v, h), 0.0), 5.0);
-    return (m.f0 + (1.0 - m.f0) * f) * d * smith;
+    float smith = nl * sqrt(nv * nv * (1.0 - a2) + a2) + nv * sqrt(nl * nl * (1.0 - a2) + a2);
+    float x = 1.0 - vh, x2 = x * x;
+    return (f0 + (1.0 - f0) * (x2 * x2 * x)) * (0.5 * nl * a2 / (3.14159265 * t * t * smith));
 }
 
 #if defined(HAS_RECT) || defined(HAS_ROUND)
 // Quadrature of the specular part over the emitter, k x k cells. Scenes without glossy materials get
-// by with four. The loop has a constant length: a dynamic one costs software rasterisers more than
-// the samples it saves.
+// by with four. All that a point u of the emitter needs is linear in u, or quadratic without the mixed
+// term, so nothing but scalars is left inside the loop. It has a constant length: a dynamic one costs
+// software rasterisers more than the samples it saves.
 vec3 specular_area(Material m, ShadeLight s, vec3 p, vec3 n, vec3 v)
 {
     int type = int(s.origin.w);
@@ -60,16 +59,23 @@ vec3 specular_area(Material m, ShadeLight s, vec3 p, vec3 n, vec3 v)
 #else
     const int k = 2;
 #endif
-    vec3 half_x = s.half_x.xyz, half_y = s.half_y.xyz, axis = s.z.xyz;
+    vec3 half_x = s.half_x.xyz, half_y = s.half_y.xyz, axis = s.z.xyz, to = s.origin.xyz - p;
 #ifdef HAS_ROUND
     if (type == SPHERE) { // the disk that faces the receiver
-        axis = normalize(p - s.origin.xyz);
+        axis = -normalize(to);
         vec3 up = abs(axis.y) < 0.9 ? vec3(0.0, 1.0, 0.0) : vec3(1.0, 0.0, 0.0);
         half_x = normalize(cross(up, axis)) * s.half_x.w;
         half_y = cross(axis, half_x);
     }
 #endif
-    float cell = (type == RECT ? 4.0 : 3.14159265) * length(half_x) * length(half_y) / float(k * k);
+    vec2 size2 = vec2(dot(half_x, half_x), dot(half_y, half_y));
+    float cell = (type == RECT ? 4.0 : 3.14159265) * sqrt(size2.x * size2.y) / float(k * k);
+    // The lobe is widened by the solid angle that one cell stands for.
+    float to2 = dot(to, to), a = m.alpha + min(0.25 * sqrt(cell / to2), 0.5);
+    float nv = max(dot(n, v), 1e-3), facing = max(-dot(axis, to), 0.0);
+    vec3 n_of = vec3(dot(n, half_x), dot(n, half_y), dot(n, to));
+    vec3 v_of = vec3(dot(v, half_x), dot(v, half_y), dot(v, to));
+    vec2 to_of = 2.0 * vec2(dot(to, half_x), dot(to, half_y));
     vec3 sum = vec3(0.0);
     for (int i = 0; i < k * k; i++) {
         vec2 u = (vec2(i % k, i / k) + 0.5) * (2.0 / float(k)) - 1.0;
@@ -81,13 +87,12 @@ vec3 specular_area(Material m, ShadeLight s, vec3 p, vec3 n, vec3 v)
             u = r * vec2(cos(t), sin(t));
         }
 #endif
-        vec3 to = s.origin.xyz + u.x * half_x + u.y * half_y - p;
-        float d2 = dot(to, to);
-        vec3 l = to * inversesqrt(d2);
-        float g = max(dot(n, l), 0.0) * max(-dot(axis, l), 0.0) / d2 * cell;
-        sum += specular_brdf(m, n, v, l, min(0.25 * sqrt(cell / d2), 0.5)) * g;
+        float inverse = inversesqrt(to2 + dot(u, to_of) + dot(u * u, size2));
+        float nl = max(dot(vec3(u, 1.0), n_of) * inverse, 1e-6);
+        float vl = dot(vec3(u, 1.0), v_of) * inverse;
+        sum += specular_brdf(m.f0, a, nv, nl, vl) * (inverse * inverse * inverse);
     }
-    return sum;
+    return sum * (facing * cell);
 }
 
 vec3 reflected_area(Material m, ShadeLight s, vec3 p, vec3 n, vec3 v)
@@ -123,7 +128,8 @@ vec3 reflected_punctual(Material m, ShadeLight s, vec3 p, vec3 n, vec3 v)
     float e = type == SUN ? nl : nl / dot(to, to);
     if (type == SPOT)
         e *= pow(clamp((dot(-l, s.z.xyz) - s.z.w) / max(s.half_y.w - s.z.w, 1e-4), 0.0, 1.0), 2.0);
-    return (m.diffuse * (1.0 / 3.14159265) + specular_brdf(m, n, v, l, 0.0)) * e;
+    float nv = max(dot(n, v), 1e-3);
+    return (m.diffuse * (1.0 / 3.14159265) + specular_brdf(m.f0, m.alpha, nv, nl, dot(v, l)) / nl) * e;
 }
 #endif
 

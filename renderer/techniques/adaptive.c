@@ -93,7 +93,7 @@ static bool record(struct technique_run *run, struct pen_error *error)
     if (params->estimator == ESTIMATOR_CSM) {
         struct convolution_desc desc = CONVOLUTION_DESC(params, true);
         desc.size = params->series_size;
-        return convolution_screen(run, &desc, pass, error);
+        return convolution_screen(run, &desc, pass, 1.5f * params->min_filter + 1, error);
     }
     const struct shadow_input *map = pass_caster_map(run, params->map_size, error);
     const struct shadow_input *min_max =

@@ -1,5 +1,6 @@
 /* Rows and glue that the methods on convolution shadow maps share. */
 #pragma once
+#include "renderer/passes/classify.h"
 #include "renderer/passes/convolution.h"
 #include "renderer/techniques/map_params.h"
 #include <stdio.h>
@@ -30,14 +31,17 @@
         .damping = (params)->damping, .offset = (params)->offset, .weighted = (with_depth)         \
     }
 
-/* Prepares the maps and runs the pass, whose body includes convolution.glsl, over the receivers. */
+/* Prepares the maps and runs the pass, whose body includes convolution.glsl, over the receivers.
+ * `margin`: texels that it looks at beyond the light's windows; negative: every pixel is drawn. */
 static inline bool convolution_screen(struct technique_run *run,
-    const struct convolution_desc *desc, struct pass_screen pass, struct pen_error *error)
+    const struct convolution_desc *desc, struct pass_screen pass, float margin,
+    struct pen_error *error)
 {
     const struct shadow_input *series = pass_convolution(run, desc, error);
     const struct shadow_input *min_max =
         series ? pass_caster_min_max(run, desc->size, error) : NULL;
-    if (!min_max)
+    if (!min_max ||
+        (margin >= 0 && !pass_lit_tiles(run, desc->size, margin, 0, &pass.tiles, error)))
         return false;
     bool tables = desc->format == CONVOLUTION_TABLES;
     enum gl_sampler_kind sampler = tables ? GL_SAMPLE_NEAREST : GL_SAMPLE_TRILINEAR;

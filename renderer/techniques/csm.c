@@ -31,7 +31,7 @@ static bool record(struct technique_run *run, struct pen_error *error)
     return convolution_screen(run, &desc,
         (struct pass_screen){
             .name = "csm", .body = "csm.glsl", .defines = params->raw.on ? "#define RAW\n" : NULL},
-        error);
+        params->raw.on ? -1 : 1.5f * params->radius + 1, error);
 }
 
 const struct technique technique_csm = {

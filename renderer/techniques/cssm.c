@@ -29,8 +29,8 @@ static bool record(struct technique_run *run, struct pen_error *error)
 {
     const struct cssm *params = run->params;
     struct convolution_desc desc = CONVOLUTION_DESC(params, true);
-    return convolution_screen(
-        run, &desc, (struct pass_screen){.name = "cssm", .body = "cssm.glsl"}, error);
+    return convolution_screen(run, &desc, (struct pass_screen){.name = "cssm", .body = "cssm.glsl"},
+        1.5f * params->min_filter + 1, error);
 }
 
 const struct technique technique_cssm = {

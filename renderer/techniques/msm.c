@@ -32,12 +32,16 @@ static bool record(struct technique_run *run, struct pen_error *error)
         .size = params->map_size,
         .blur = params->blur};
     const struct shadow_input *map = pass_moments(run, &desc, error);
-    if (!map)
+    const struct gl_texture *tiles;
+    if (!map || !pass_moment_tiles(run, &desc, &tiles, error))
         return false;
     struct pass_texture texture = {UNIT_FREE, map->textures[0].name, GL_SAMPLE_TRILINEAR};
     return pass_screen(run,
-        &(struct pass_screen){
-            .name = "msm", .body = "msm.glsl", .textures = &texture, .texture_count = 1},
+        &(struct pass_screen){.name = "msm",
+            .body = "msm.glsl",
+            .textures = &texture,
+            .texture_count = 1,
+            .tiles = tiles},
         error);
 }
 

@@ -1,3 +1,4 @@
+#include "renderer/passes/classify.h"
 #include "renderer/passes/sat.h"
 #include "renderer/techniques/map_params.h"
 
@@ -38,7 +39,8 @@ static bool record(struct technique_run *run, struct pen_error *error)
     struct sat_block block;
     const struct shadow_input *min_max = pass_min_max(run, params->map_size, error);
     const struct shadow_input *sat = min_max ? pass_sat(run, &table, &block, error) : NULL;
-    if (!sat)
+    const struct gl_texture *tiles;
+    if (!sat || !pass_lit_tiles(run, params->map_size, params->min_filter + 1, 0, &tiles, error))
         return false;
     struct pass_texture textures[] = {{UNIT_FREE + 1, sat->textures[0].name, GL_SAMPLE_NEAREST},
         {UNIT_MIN_MAX, min_max->textures[0].name, GL_SAMPLE_NEAREST}};
@@ -47,6 +49,7 @@ static bool record(struct technique_run *run, struct pen_error *error)
             .body = "mssm.glsl",
             .textures = textures,
             .texture_count = 2,
+            .tiles = tiles,
             .extra = &block,
             .extra_bytes = sizeof block},
         error);

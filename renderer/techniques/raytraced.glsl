@@ -1,11 +1,20 @@
 #include "horizon.glsl"
-layout(binding = 7) uniform sampler2D traced; // rgb: mean of e V, a: mean of V
+layout(binding = 7) uniform sampler2D traced;         // rgb: mean of e V, a: mean of V
+layout(binding = 8) uniform sampler2D standard_error; // of a
 
+// VARIANCE: instead, the square of the standard error of a.
 vec4 visibility(Surface s)
 {
     vec4 t = texelFetch(traced, s.pixel, 0);
+#ifdef VARIANCE
+    t = texelFetch(standard_error, s.pixel, 0).rrrr;
+#endif
 #if P_weighting == 0
     t /= horizon_weight(horizon_share(s.p, s.n));
 #endif
-    return clamp(t, 0.0, 1.0);
+    t = clamp(t, 0.0, 1.0);
+#ifdef VARIANCE
+    t *= t;
+#endif
+    return t;
 }

@@ -1,3 +1,4 @@
+#include "renderer/passes/classify.h"
 #include "renderer/passes/interleave.h"
 #include "renderer/passes/sat.h"
 #include "renderer/techniques/map_params.h"
@@ -52,7 +53,8 @@ static bool record(struct technique_run *run, struct pen_error *error)
     const struct shadow_input *map = pass_depth_map(run, params->map_size, error);
     const struct shadow_input *min_max = map ? pass_min_max(run, params->map_size, error) : NULL;
     const struct shadow_input *sat = min_max ? pass_sat(run, &table, &block, error) : NULL;
-    if (!sat)
+    const struct gl_texture *tiles;
+    if (!sat || !pass_lit_tiles(run, params->map_size, params->min_filter + 1, 0, &tiles, error))
         return false;
     struct pass_texture textures[] = {{UNIT_FREE + 1, sat->textures[0].name, GL_SAMPLE_NEAREST},
         {UNIT_MIN_MAX, min_max->textures[0].name, GL_SAMPLE_NEAREST}};
@@ -61,6 +63,7 @@ static bool record(struct technique_run *run, struct pen_error *error)
         .shadow = &map->textures[0],
         .textures = textures,
         .texture_count = 2,
+        .tiles = tiles,
         .extra = &block,
         .extra_bytes = sizeof block};
     return params->smooth.on ? pass_interleaved(run, &pass, error) : pass_screen(run, &pass, error);

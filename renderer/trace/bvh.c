@@ -1,5 +1,6 @@
 /* Building and walking the hierarchy. */
 #include "renderer/trace/bvh.h"
+#include "renderer/trace/casters.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -23,14 +24,26 @@ struct split {
     float low, scale, cost;
 };
 
+/* fminf and fmaxf are calls into the mathematics library. Where a is NaN these give b: what grows
+ * ignores a triangle whose transform overflowed. */
+static inline float lesser(float a, float b)
+{
+    return a < b ? a : b;
+}
+
+static inline float greater(float a, float b)
+{
+    return a > b ? a : b;
+}
+
 static const struct box empty_box = {
     {INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
 
 static void grow(struct box *box, const struct box *by)
 {
     for (int c = 0; c < 3; c++) {
-        box->low[c] = fminf(box->low[c], by->low[c]);
-        box->high[c] = fmaxf(box->high[c], by->high[c]);
+        box->low[c] = lesser(by->low[c], box->low[c]);
+        box->high[c] = greater(by->high[c], box->high[c]);
     }
 }
 
@@ -38,7 +51,7 @@ static float half_area(const struct box *box)
 {
     float d[3];
     for (int c = 0; c < 3; c++)
-        d[c] = fmaxf(box->high[c] - box->low[c], 0);
+        d[c] = greater(box->high[c] - box->low[c], 0);
     return d[0] * d[1] + d[1] * d[2] + d[2] * d[0];
 }
 
@@ -50,7 +63,7 @@ static float middle(const struct item *item, int axis)
 static uint32_t bin_of(const struct split *split, const struct item *item)
 {
     float at = (middle(item, split->axis) - split->low) * split->scale;
-    return at < BINS - 1 ? (uint32_t)fmaxf(at, 0) : BINS - 1;
+    return at < BINS - 1 ? (uint32_t)greater(at, 0) : BINS - 1;
 }
 
 /* The cheapest plane between two bins of one axis. */
@@ -129,8 +142,8 @@ static uint32_t divide(struct item *items, uint32_t count, float area, uint32_t 
     struct box centres = empty_box;
     for (uint32_t i = 0; i < count; i++)
         for (int c = 0; c < 3; c++) {
-            centres.low[c] = fminf(centres.low[c], middle(&items[i], c));
-            centres.high[c] = fmaxf(centres.high[c], middle(&items[i], c));
+            centres.low[c] = lesser(middle(&items[i], c), centres.low[c]);
+            centres.high[c] = greater(middle(&items[i], c), centres.high[c]);
         }
     for (int axis = 0; axis < 3; axis++) {
         struct split s = split_axis(items, count, axis, centres.low[axis], centres.high[axis]);
@@ -219,8 +232,8 @@ bool pen_bvh_build(const struct pen_bvh_triangle *triangles, uint32_t count, str
         items[i].triangle = i;
         for (int c = 0; c < 3; c++) {
             float a = t->corner[c], b = a + t->edge1[c], d = a + t->edge2[c];
-            box->low[c] = fminf(a, fminf(b, d));
-            box->high[c] = fmaxf(a, fmaxf(b, d));
+            box->low[c] = lesser(a, lesser(b, d));
+            box->high[c] = greater(a, greater(b, d));
         }
     }
     build_nodes(items, count, bvh);
@@ -241,7 +254,7 @@ void pen_bvh_finish(struct pen_bvh *bvh)
 
 /* One world-space triangle of an instance. */
 static struct pen_bvh_triangle make_triangle(
-    const struct psc_scene *scene, uint32_t number, uint32_t first_index)
+    const struct psc_scene *scene, uint32_t number, uint32_t first_index, bool alpha)
 {
     const struct psc_instance *instance = &scene->instances[number];
     const struct psc_material *material =
@@ -263,31 +276,50 @@ static struct pen_bvh_triangle make_triangle(
     }
     t.flags = (swapped ? PEN_BVH_SWAPPED : 0u) |
               (material->flags & PSC_DOUBLE_SIDED ? PEN_BVH_TWO_SIDED : 0u) |
-              (material->alpha_mode != PSC_OPAQUE ? PEN_BVH_ALPHA : 0u);
+              (alpha ? PEN_BVH_ALPHA : 0u);
     return t;
+}
+
+/* All triangles of the instances that cast; `count` of them. NULL when memory is short. */
+static struct pen_bvh_triangle *gather_triangles(
+    const struct psc_scene *scene, const uint8_t *casters, uint64_t count)
+{
+    struct pen_bvh_triangle *triangles = malloc((count + 1) * sizeof *triangles);
+    uint64_t next = 0;
+    for (uint32_t i = 0; triangles && i < scene->instance_count; i++) {
+        uint32_t number = scene->instances[i].primitive;
+        const struct psc_primitive *p = &scene->primitives[number];
+        bool alpha = casters[number] == TRACE_CASTS_BY_ALPHA;
+        for (uint32_t k = 0; casters[number] != TRACE_CASTS_NOTHING && k + 2 < p->index_count;
+             k += 3)
+            triangles[next++] = make_triangle(scene, i, p->first_index + k, alpha);
+    }
+    return triangles;
 }
 
 bool pen_bvh_build_scene(const struct psc_scene *scene, uint64_t max_triangles, struct pen_bvh *bvh,
     struct pen_error *error)
 {
     uint64_t count = 0, limit = max_triangles ? max_triangles : 1u << 26;
+    uint8_t *casters = trace_casters(scene);
     *bvh = (struct pen_bvh){0};
-    for (uint32_t i = 0; i < scene->instance_count; i++)
-        count += scene->primitives[scene->instances[i].primitive].index_count / 3;
-    if (count > limit)
+    if (!casters)
+        return pen_fail(error, PEN_INTERNAL, "", "Out of memory.");
+    for (uint32_t i = 0; i < scene->instance_count; i++) {
+        uint32_t number = scene->instances[i].primitive;
+        if (casters[number] != TRACE_CASTS_NOTHING)
+            count += scene->primitives[number].index_count / 3;
+    }
+    bool fits = count <= limit;
+    struct pen_bvh_triangle *triangles = fits ? gather_triangles(scene, casters, count) : NULL;
+    free(casters);
+    if (!fits)
         return pen_fail(error, PEN_TOO_LARGE, "/scene",
             "The scene has %llu triangles; %llu can be ray traced.", (unsigned long long)count,
             (unsigned long long)limit);
-    struct pen_bvh_triangle *triangles = malloc((count + 1) * sizeof *triangles);
     if (!triangles)
         return pen_fail(error, PEN_INTERNAL, "", "Out of memory.");
-    uint32_t next = 0;
-    for (uint32_t i = 0; i < scene->instance_count; i++) {
-        const struct psc_primitive *p = &scene->primitives[scene->instances[i].primitive];
-        for (uint32_t k = 0; k + 2 < p->index_count; k += 3)
-            triangles[next++] = make_triangle(scene, i, p->first_index + k);
-    }
-    bool ok = pen_bvh_build(triangles, next, bvh, error);
+    bool ok = pen_bvh_build(triangles, (uint32_t)count, bvh, error);
     free(triangles);
     return ok;
 }
@@ -300,8 +332,8 @@ static float enter(
     for (int c = 0; c < 3; c++) {
         float a = (node->low[c] - origin[c]) * inverse[c];
         float b = (node->high[c] - origin[c]) * inverse[c];
-        near = fmaxf(near, fminf(a, b));
-        far = fminf(far, fmaxf(a, b));
+        near = greater(near, lesser(a, b));
+        far = lesser(far, greater(a, b));
     }
     return near <= far * 1.0000005f ? near : INFINITY; /* rounding must not lose a box */
 }

@@ -23,7 +23,7 @@ struct pen_bvh_node {
 
 enum pen_bvh_flags {
     PEN_BVH_TWO_SIDED = 1, /* a hit on the back counts too */
-    PEN_BVH_ALPHA = 2,     /* the material's alpha decides: look up the texture */
+    PEN_BVH_ALPHA = 2,     /* TRACE_CASTS_BY_ALPHA: look up the texture */
     PEN_BVH_SWAPPED = 4,   /* mirrored instance: corners 1 and 2 are exchanged, so that the front
                               is where corner, edge1, edge2 run counter-clockwise */
 };
@@ -45,8 +45,9 @@ struct pen_bvh {
     float cost;     /* expected node and triangle tests of a ray that hits the root box */
 };
 
-/* All instances' triangles. Binned surface-area heuristic (Wald 2007), one thread: about one second
- * per million triangles. Errors: PEN_TOO_LARGE above `max_triangles` (0: 2^26). */
+/* The triangles of all instances that can cast (casters.h). Binned surface-area heuristic (Wald
+ * 2007), one thread: about one second per million triangles. Errors: PEN_TOO_LARGE above
+ * `max_triangles` (0: 2^26). */
 bool pen_bvh_build_scene(const struct psc_scene *scene, uint64_t max_triangles, struct pen_bvh *bvh,
     struct pen_error *error);
 /* The same over `count` triangles of the caller's, which are copied. */

@@ -1,5 +1,6 @@
 /* What the files of this folder share. */
 #pragma once
+#include "renderer/trace/points.h"
 #include "renderer/trace/trace.h"
 #include <embree3/rtcore.h>
 #include <stdatomic.h>
@@ -30,7 +31,6 @@ struct trace_alpha_material {
     const uint8_t *texels; /* alpha of the finest level; NULL: 1 */
     uint32_t width, height, wrap_s, wrap_t;
     bool nearest, blend, two_sided, prepared;
-    uint8_t texel_low, texel_high;
     float factor, cutoff;
 };
 
@@ -113,20 +113,6 @@ bool trace_check_device(struct pen_trace_scene *scene, struct pen_error *error);
 
 /* Alpha at a point of triangle `primitive`; u, v as Embree gives them. */
 float trace_alpha_at(const struct trace_alpha *alpha, uint32_t primitive, float u, float v);
-
-static inline uint32_t trace_hash(uint32_t x)
-{
-    x ^= x >> 16;
-    x *= 0x7feb352du;
-    x ^= x >> 15;
-    x *= 0x846ca68bu;
-    return x ^ (x >> 16);
-}
-
-/* Fills xs and ys with points [first, first + count) of an Owen-scrambled Sobol sequence as 32-bit
- * fractions, count a power of two that divides first: a (0, log2 count, 2)-net in base 2. Points
- * 2k and 2k + 1 share one of count / 2 equal cells of the unit square, and cells are in order. */
-bool trace_samples_net(uint32_t first, uint32_t count, uint32_t seed, uint32_t *xs, uint32_t *ys);
 
 /* Calls work(context, item) for every item below `count` on `threads` threads, the caller's among
  * them, with denormals flushed. Adds their processor time to *cpu_seconds. */

@@ -23,13 +23,6 @@ struct trace_silhouette trace_silhouette_of(const struct trace_emitter *emitter)
 bool trace_emitter_average(
     const struct trace_emitter *emitter, float mean[3], struct pen_error *error);
 
-/* Sample points as signed 32-bit fractions of [-1,1]. Points 2k and 2k + 1 share a stratum. */
-struct trace_block {
-    const int32_t *u, *v;
-    uint32_t count;
-    uint32_t salt; /* of the stochastic alpha */
-};
-
 struct trace_packet {
     struct RTCRay16 ray;
     float base[3][TRACE_LANES];                 /* from the ray's origin to the light's centre */

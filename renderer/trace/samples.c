@@ -1,6 +1,6 @@
 /* Owen-scrambled Sobol points, the first two dimensions. Sobol 1967; nested scrambling by hashing
  * after Laine & Karras 2011. */
-#include "renderer/trace/internal.h"
+#include "renderer/trace/points.h"
 #include <stdlib.h>
 #include <string.h>
 

@@ -1,5 +1,6 @@
 /* From a blob to triangles in world space. Instances are flattened: one level of hierarchy is
  * faster to traverse than two, and the caller bounds the memory. */
+#include "renderer/trace/casters.h"
 #include "renderer/trace/internal.h"
 #include <math.h>
 #include <stdlib.h>
@@ -67,9 +68,7 @@ static bool prepare_alpha_material(struct build *b, uint32_t index)
         .cutoff = m->alpha_cutoff,
         .blend = m->alpha_mode == PSC_BLEND,
         .two_sided = (m->flags & PSC_DOUBLE_SIDED) != 0,
-        .prepared = true,
-        .texel_low = 255,
-        .texel_high = 255};
+        .prepared = true};
     if (m->base.texture < 0)
         return true;
     const struct psc_texture *texture = &b->blob->textures[m->base.texture];
@@ -81,46 +80,18 @@ static bool prepare_alpha_material(struct build *b, uint32_t index)
     out->wrap_s = texture->wrap_s;
     out->wrap_t = texture->wrap_t;
     out->nearest = texture->nearest & 1;
-    out->texel_high = 0;
-    for (size_t i = 0; i < (size_t)out->width * out->height; i++) {
-        out->texel_low = out->texels[i] < out->texel_low ? out->texels[i] : out->texel_low;
-        out->texel_high = out->texels[i] > out->texel_high ? out->texels[i] : out->texel_high;
-    }
     return true;
 }
 
-/* Lowest and highest alpha that any point of the primitive can have. */
-static void alpha_range(struct build *b, const struct psc_primitive *p, float range[2])
-{
-    const struct trace_alpha_material *m = &b->out->alpha.table[p->material];
-    uint8_t low = 255, high = 0;
-    for (uint32_t i = 0; i < p->vertex_count; i++) {
-        uint8_t a = b->blob->attributes[p->first_vertex + i].color[3];
-        low = a < low ? a : low;
-        high = a > high ? a : high;
-    }
-    range[0] = m->factor * ((float)low / 255) * ((float)m->texel_low / 255);
-    range[1] = m->factor * ((float)high / 255) * ((float)m->texel_high / 255);
-}
-
-static bool plan_primitive(struct build *b, uint32_t index)
+static bool plan_primitive(struct build *b, uint32_t index, enum trace_caster caster)
 {
     const struct psc_primitive *p = &b->blob->primitives[index];
-    const struct psc_material *m = &b->blob->materials[p->material];
-    uint32_t group = m->flags & PSC_DOUBLE_SIDED ? TRACE_TWO_SIDED : TRACE_FACING;
-    if (m->alpha_mode != PSC_OPAQUE) {
-        float range[2];
-        if (!prepare_alpha_material(b, p->material))
-            return false;
-        alpha_range(b, p, range);
-        bool blend = m->alpha_mode == PSC_BLEND;
-        if (blend ? range[1] <= 0 : range[1] < m->alpha_cutoff)
-            group = TRACE_GROUPS;
-        else if (blend ? range[0] < 1 : range[0] < m->alpha_cutoff)
-            group = TRACE_ALPHA;
-    }
-    b->plans[index] = (uint8_t)(p->index_count >= 3 ? group : TRACE_GROUPS);
-    return true;
+    bool two_sided = b->blob->materials[p->material].flags & PSC_DOUBLE_SIDED;
+    uint32_t group = two_sided ? TRACE_TWO_SIDED : TRACE_FACING;
+    if (caster != TRACE_CASTS)
+        group = caster == TRACE_CASTS_BY_ALPHA ? TRACE_ALPHA : TRACE_GROUPS;
+    b->plans[index] = (uint8_t)group;
+    return group != TRACE_ALPHA || prepare_alpha_material(b, p->material);
 }
 
 static bool plan_all(struct build *b, struct pen_error *error)
@@ -133,9 +104,13 @@ static bool plan_all(struct build *b, struct pen_error *error)
     alpha->image_count = blob->image_count;
     if (!b->plans || !alpha->table || !alpha->images)
         return pen_fail(error, PEN_INTERNAL, "", "Out of memory.");
-    for (uint32_t i = 0; i < blob->primitive_count; i++)
-        if (!plan_primitive(b, i))
-            return pen_fail(error, PEN_INTERNAL, "", "Out of memory.");
+    uint8_t *casters = trace_casters(blob);
+    bool planned = casters != NULL;
+    for (uint32_t i = 0; planned && i < blob->primitive_count; i++)
+        planned = plan_primitive(b, i, casters[i]);
+    free(casters);
+    if (!planned)
+        return pen_fail(error, PEN_INTERNAL, "", "Out of memory.");
     for (uint32_t i = 0; i < blob->instance_count; i++) {
         const struct psc_primitive *p = &blob->primitives[blob->instances[i].primitive];
         uint32_t group = b->plans[blob->instances[i].primitive];

@@ -6,12 +6,6 @@
 
 #define TILE 16 /* receivers along an edge; a multiple of 4 */
 #define TILE_RECEIVERS (TILE * TILE)
-#define MAX_SAMPLES 65536u
-#define FIRST_BLOCK 256u /* samples before a receiver may stop early */
-#define MAX_BLOCKS 16
-#define PRETEST_NET 16u
-#define PRETEST_RIM 4u
-#define DEFAULT_DILATION 4u
 
 enum verdict { NO_RECEIVER, UMBRA, LIT, MIXED };
 
@@ -22,10 +16,8 @@ struct run {
     struct trace_emitter emitter;
     float mean_emission[3];
     uint32_t mode; /* enum trace_mode */
-    uint32_t samples, low_bits, pretest_low_bits, position_stride, normal_stride;
-    int32_t *points; /* u then v of all samples, then of the pre-test */
-    struct trace_block blocks[MAX_BLOCKS], pretest, rim;
-    uint32_t block_count;
+    uint32_t samples, position_stride, normal_stride;
+    struct trace_points points;
     uint8_t *verdicts; /* adaptive: enum verdict per receiver */
     uint8_t *full;     /* adaptive: 1 where all samples are wanted */
     uint32_t tiles_x, tile_width, tile_height;
@@ -150,21 +142,21 @@ static void sample_receivers(
     struct trace_packet packet;
     struct total totals[TILE_RECEIVERS] = {0};
     uint64_t rays = 0;
-    for (uint32_t b = 0; b < run->block_count && count; b++) {
+    for (uint32_t b = 0; b < run->points.block_count && count; b++) {
         for (uint32_t first = 0; first < count; first += TRACE_LANES) {
             uint32_t lanes = count - first < TRACE_LANES ? count - first : TRACE_LANES;
             struct trace_sums sums = {0};
-            trace_packet_load(
-                &packet, &run->emitter, receivers + first, lanes, run->job->seed, run->low_bits);
+            trace_packet_load(&packet, &run->emitter, receivers + first, lanes, run->job->seed,
+                run->points.low_bits);
             trace_packet_run(
-                &run->emitter, &packet, &run->blocks[b], run->mode | extra_mode, &sums);
+                &run->emitter, &packet, &run->points.blocks[b], run->mode | extra_mode, &sums);
             for (uint32_t lane = 0; lane < lanes; lane++)
-                add_sums(run, &totals[first + lane], &sums, (int)lane, run->blocks[b].count);
+                add_sums(run, &totals[first + lane], &sums, (int)lane, run->points.blocks[b].count);
             rays += sums.rays;
         }
         uint32_t kept = 0;
         for (uint32_t i = 0; i < count; i++) {
-            if (b + 1 == run->block_count || error_of(&totals[i]) < run->job->target_error) {
+            if (b + 1 == run->points.block_count || error_of(&totals[i]) < run->job->target_error) {
                 finish(run, receivers[i].pixel, &totals[i], !(extra_mode & TRACE_ASSUME_VISIBLE));
                 continue;
             }
@@ -226,14 +218,14 @@ static void pretest_tile(void *context, uint32_t item)
         uint32_t lanes = count - first < TRACE_LANES ? count - first : TRACE_LANES;
         struct trace_sums sums = {0};
         trace_packet_load(&packet, &run->emitter, receivers + first, lanes, ~run->job->seed,
-            run->pretest_low_bits);
-        trace_packet_run(&run->emitter, &packet, &run->pretest, TRACE_COUNT_ONLY, &sums);
-        trace_packet_run(&run->emitter, &packet, &run->rim, TRACE_UNSHIFTED, &sums);
+            run->points.pretest_low_bits);
+        trace_packet_run(&run->emitter, &packet, &run->points.pretest, TRACE_COUNT_ONLY, &sums);
+        trace_packet_run(&run->emitter, &packet, &run->points.rim, TRACE_UNSHIFTED, &sums);
         for (uint32_t lane = 0; lane < lanes; lane++)
             run->verdicts[receivers[first + lane].pixel] =
-                sums.count[lane] == PRETEST_NET + PRETEST_RIM ? LIT
-                : sums.count[lane] == 0                       ? UMBRA
-                                                              : MIXED;
+                sums.count[lane] == TRACE_PRETEST_NET + TRACE_PRETEST_RIM ? LIT
+                : sums.count[lane] == 0                                   ? UMBRA
+                                                                          : MIXED;
         rays += sums.rays;
     }
     atomic_fetch_add(&run->rays, rays);
@@ -273,7 +265,7 @@ static bool is_edge(uint8_t a, uint8_t b)
 static bool dilate(struct run *run)
 {
     uint32_t w = run->job->width, h = run->job->height;
-    uint32_t radius = run->job->dilation ? run->job->dilation : DEFAULT_DILATION;
+    uint32_t radius = run->job->dilation ? run->job->dilation : TRACE_DILATION;
     uint8_t *rows = calloc((size_t)w * h, 1);
     if (!rows)
         return false;
@@ -296,52 +288,6 @@ static bool dilate(struct run *run)
     return true;
 }
 
-static uint32_t log2_floor(uint32_t x)
-{
-    return 31 - (uint32_t)__builtin_clz(x);
-}
-
-/* All points: the blocks, the pre-test's net, the light's corners (a disk's four quarters). */
-static bool prepare_points(struct run *run, struct pen_error *error)
-{
-    const struct pen_trace_job *job = run->job;
-    uint32_t n = run->samples, total = n + PRETEST_NET + PRETEST_RIM;
-    uint32_t *xs = malloc(2 * (size_t)total * sizeof *xs), *ys = xs + total;
-    run->points = (int32_t *)xs;
-    if (!xs)
-        return pen_fail(error, PEN_INTERNAL, "", "Out of memory.");
-    uint32_t block = job->target_error > 0 && n > FIRST_BLOCK ? FIRST_BLOCK : n;
-    uint32_t salt = trace_hash(job->seed + 1);
-    run->low_bits = 0xffffffffu >> (log2_floor(block) / 2);
-    run->pretest_low_bits = 0xffffffffu >> (log2_floor(PRETEST_NET) / 2);
-    bool ok = true;
-    for (uint32_t first = 0; first < n && ok; first += block) {
-        if (first > block) /* 256, 256, 512, 1024, ... : each a net of its own */
-            block = first;
-        ok = trace_samples_net(first, block, job->seed, xs + first, ys + first);
-        run->blocks[run->block_count++] = (struct trace_block){
-            run->points + first, run->points + total + first, block, salt + first};
-    }
-    ok = ok && trace_samples_net(0, PRETEST_NET, ~job->seed, xs + n, ys + n);
-    if (!ok)
-        return pen_fail(error, PEN_INTERNAL, "", "Out of memory.");
-    for (uint32_t i = 0; i < n + PRETEST_NET; i++) { /* from [0,1) to [-1,1) */
-        xs[i] ^= 0x80000000u;
-        ys[i] ^= 0x80000000u;
-    }
-    bool round = run->emitter.type != PEN_TRACE_RECT;
-    for (uint32_t i = 0; i < PRETEST_RIM; i++) {
-        int32_t far_u = i & 1 ? INT32_MAX : -INT32_MAX, far_v = i & 2 ? INT32_MAX : -INT32_MAX;
-        run->points[n + PRETEST_NET + i] = round && (i == 0 || i == 3) ? 0 : far_u;
-        run->points[total + n + PRETEST_NET + i] = round && (i == 1 || i == 2) ? 0 : far_v;
-    }
-    run->pretest = (struct trace_block){
-        run->points + n, run->points + total + n, PRETEST_NET, salt + MAX_SAMPLES};
-    run->rim = (struct trace_block){run->points + n + PRETEST_NET,
-        run->points + total + n + PRETEST_NET, PRETEST_RIM, salt + MAX_SAMPLES + PRETEST_NET};
-    return true;
-}
-
 static bool check_job(
     const struct pen_trace_light *light, const struct pen_trace_job *job, struct pen_error *error)
 {
@@ -356,9 +302,9 @@ static bool check_job(
     if (job->width == 0 || job->height == 0 ||
         (uint64_t)job->width * job->height >= (uint64_t)1 << 31)
         return pen_fail(error, PEN_UNPROCESSABLE, "", "The job has no or too many receivers.");
-    if (job->samples == 0 || job->samples > MAX_SAMPLES)
+    if (job->samples == 0 || job->samples > TRACE_MAX_SAMPLES)
         return pen_fail(
-            error, PEN_UNPROCESSABLE, "", "The sample count must be 1 to %u.", MAX_SAMPLES);
+            error, PEN_UNPROCESSABLE, "", "The sample count must be 1 to %u.", TRACE_MAX_SAMPLES);
     return true;
 }
 
@@ -389,7 +335,7 @@ bool pen_trace_visibility(struct pen_trace_scene *scene, const struct pen_trace_
     if (!check_job(light, job, error))
         return false;
     bool point = light->type == PEN_TRACE_POINT;
-    run.samples = point ? 1 : 1u << log2_floor(2 * job->samples - 1);
+    run.samples = point ? 1 : trace_points_round(job->samples);
     run.position_stride = job->position_stride ? job->position_stride : 3;
     run.normal_stride = job->normal_stride ? job->normal_stride : 3;
     run.emitter = trace_emitter_of(light);
@@ -404,7 +350,8 @@ bool pen_trace_visibility(struct pen_trace_scene *scene, const struct pen_trace_
     start = trace_seconds();
     run.emitter.scene = hierarchy->scene;
     if (!trace_emitter_average(&run.emitter, run.mean_emission, error) ||
-        !prepare_points(&run, error))
+        !trace_points_make(&run.points, run.samples, job->target_error > 0,
+            run.emitter.type != PEN_TRACE_RECT, job->seed, error))
         goto fail;
     run.tile_height = job->height == 1 ? 1 : TILE;
     run.tile_width = job->height == 1 ? TILE_RECEIVERS : TILE;
@@ -412,7 +359,7 @@ bool pen_trace_visibility(struct pen_trace_scene *scene, const struct pen_trace_
     uint32_t tiles = run.tiles_x * ((job->height + run.tile_height - 1) / run.tile_height);
     uint32_t threads = trace_thread_count(job->threads);
     trace_parallel(threads, tiles, clear_tile, &run, &cpu_seconds);
-    if (job->adaptive && run.samples > PRETEST_NET + PRETEST_RIM &&
+    if (job->adaptive && run.samples > TRACE_PRETEST_NET + TRACE_PRETEST_RIM &&
         !select_receivers(&run, threads, tiles, &cpu_seconds, error))
         goto fail;
     trace_parallel(threads, tiles, sample_tile, &run, &cpu_seconds);
@@ -436,7 +383,7 @@ bool pen_trace_visibility(struct pen_trace_scene *scene, const struct pen_trace_
     }
     ok = true;
 fail:
-    free(run.points);
+    trace_points_finish(&run.points);
     free(run.verdicts);
     free(run.full);
     return ok;

@@ -92,6 +92,9 @@ void harness_shot(const uint8_t id[PEN_ID_BYTES], const char *settings, struct s
         float **to = !strcmp(frame.planes[i].name, "visibility") ? &shot->visibility
                      : !strcmp(frame.planes[i].name, "position") ? &shot->position
                      : !strcmp(frame.planes[i].name, "normal")   ? &shot->normal
+                     : !strcmp(frame.planes[i].name, "beauty")   ? &shot->beauty
+                     : !strcmp(frame.planes[i].name, "classes")  ? &shot->classes
+                     : !strcmp(frame.planes[i].name, "error")    ? &shot->error
                                                                  : NULL;
         if (to) {
             *to = frame.planes[i].data;
@@ -106,6 +109,9 @@ void harness_shot_finish(struct shot *shot)
     free(shot->visibility);
     free(shot->position);
     free(shot->normal);
+    free(shot->beauty);
+    free(shot->classes);
+    free(shot->error);
     memset(shot, 0, sizeof *shot);
 }
 
@@ -197,6 +203,16 @@ static double crossing(const struct shot *shot, float level)
 double harness_width_10_90(const struct shot *shot)
 {
     return fabs(crossing(shot, 0.9f) - crossing(shot, 0.1f));
+}
+
+uint32_t harness_receivers(const struct shot *shot)
+{
+    uint32_t count = 0;
+    for (uint32_t i = 0; i < shot->width * shot->height; i++) {
+        const float *n = shot->normal + 4 * i;
+        count += n[0] != 0 || n[1] != 0 || n[2] != 0;
+    }
+    return count;
 }
 
 uint32_t harness_not_finite(const struct shot *shot)

@@ -9,6 +9,9 @@ struct shot {
     float *visibility; /* RGBA per pixel: rgb coloured, a mean visibility */
     float *position;   /* RGBA per pixel: world xyz; background: 0 */
     float *normal;     /* RGBA per pixel: world shading normal; background: 0 */
+    float *beauty;     /* RGBA per pixel: linear radiance */
+    float *classes;    /* RGBA per pixel: r = 0 proved lit, 1 undecided, 2 proved in umbra */
+    float *error;      /* RGBA per pixel: r = standard error; NULL when not estimated */
     struct pen_result result;
 };
 
@@ -57,5 +60,7 @@ double truth_one(double x, double z, const void *unused);
 
 /* Width between 10 % and 90 % along x at z = 0, m (bilinear between pixel centres). */
 double harness_width_10_90(const struct shot *shot);
+/* Pixels that show a surface. */
+uint32_t harness_receivers(const struct shot *shot);
 /* Pixels whose visibility is NaN or infinite. */
 uint32_t harness_not_finite(const struct shot *shot);

@@ -1,4 +1,4 @@
-# Without tracing there is nothing to check.
+# By the tracer on the CPU; rays.c has the shaders.
 if(TARGET penumbra_trace)
     penumbra_accuracy_test(raytraced)
 endif()

@@ -78,6 +78,61 @@ static void check_drop(struct pen_renderer *r, const uint8_t *id)
     CHECK(error.code == PEN_INTERNAL);
 }
 
+static void set_param(struct pen_request *request, const char *name, double value)
+{
+    const struct pen_technique_info *info =
+        pen_catalogue_find(pen_renderer_catalogue(), request->technique);
+    CHECK(pen_param_store(
+        pen_param_find(info->params, name), request->technique_params, &value, "", NULL));
+}
+
+static void traced_request(struct pen_request *request, const uint8_t *id)
+{
+    fixture_request(request, id, "raytraced");
+    set_param(request, "backend", 1); /* gpu */
+    set_param(request, "samples", 1);
+    request->width = 40, request->height = 30;
+}
+
+/* The hierarchy that rays need is the scene's: made once, counted, and evicted with it. */
+static void check_hierarchy(void)
+{
+    enum { TRIANGLES = 50000, SCENES = 3 };
+    struct pen_error error = {0};
+    const uint64_t budget = 16ull << 20;
+    struct pen_renderer *r = fixture_renderer(PEN_DEVICE_AUTO, budget, &error);
+    uint8_t ids[SCENES][PEN_ID_BYTES], large[PEN_ID_BYTES];
+    struct pen_request request;
+    struct pen_result result;
+    struct pen_frame frame;
+    fixture_scene(r, PEN_GENERATED_HAIRBALL, TRIANGLES, 1, ids[0]);
+    uint64_t before = pen_renderer_gpu_bytes(r);
+    traced_request(&request, ids[0]);
+    uint64_t first = fixture_render(r, &request, &result), after = pen_renderer_gpu_bytes(r);
+    CHECK(after > before + TRIANGLES * 48 && after < before + TRIANGLES * 150);
+    CHECK(result.stage_ms[PEN_STAGE_SHADOW] > 0 && result.gpu_bytes == after);
+    CHECK(fixture_render(r, &request, &result) == first);
+    CHECK(result.stage_ms[PEN_STAGE_SHADOW] == 0 && pen_renderer_gpu_bytes(r) == after);
+    for (uint32_t i = 1; i < SCENES; i++) {
+        fixture_scene(r, PEN_GENERATED_HAIRBALL, TRIANGLES, i + 1, ids[i]);
+        traced_request(&request, ids[i]);
+        fixture_render(r, &request, &result);
+        CHECK(pen_renderer_gpu_bytes(r) <= budget);
+    }
+    CHECK(!pen_renderer_has_scene(r, ids[0]));
+    fixture_scene(r, PEN_GENERATED_HAIRBALL, TRIANGLES, 1, ids[0]);
+    traced_request(&request, ids[0]);
+    CHECK(fixture_render(r, &request, &result) == first);
+    /* One that fits only without a hierarchy is refused by this method alone. */
+    fixture_scene(r, PEN_GENERATED_HAIRBALL, 6 * TRIANGLES, 1, large);
+    traced_request(&request, large);
+    CHECK(!pen_renderer_render(r, &request, &frame, &result, &error));
+    CHECK(error.code == PEN_TOO_LARGE);
+    fixture_request(&request, large, "hard");
+    fixture_render(r, &request, &result);
+    pen_renderer_destroy(r);
+}
+
 int main(void)
 {
     struct pen_error error;
@@ -91,5 +146,6 @@ int main(void)
     check_drop(r, id);
     pen_renderer_destroy(r);
     check_eviction();
+    check_hierarchy();
     CHECK_DONE();
 }

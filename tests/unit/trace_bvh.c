@@ -188,21 +188,31 @@ static void test_scene(void)
     static const float corners[3][3] = {{0, 0, 0}, {1, 0, 0}, {0, 0, -1}}; /* front is up */
     struct psc_builder *builder = psc_builder_create();
     struct psc_material material = psc_material_default();
-    uint32_t materials[2], primitives[2];
+    uint32_t materials[4], primitives[4];
     materials[0] = psc_builder_add_material(builder, &material);
     material.flags = PSC_DOUBLE_SIDED;
-    material.alpha_mode = PSC_MASK;
+    material.alpha_mode = PSC_BLEND;
+    material.base_color[3] = 0.5f;
     materials[1] = psc_builder_add_material(builder, &material);
-    for (int i = 0; i < 2; i++) {
+    material.base_color[3] = 0;
+    materials[2] = psc_builder_add_material(builder, &material); /* casts nothing */
+    material.alpha_mode = PSC_MASK;
+    material.base_color[3] = 0.5f;
+    material.alpha_cutoff = 0.5f;
+    materials[3] = psc_builder_add_material(builder, &material); /* is never cut */
+    for (int i = 0; i < 4; i++) {
         struct psc_mesh mesh = {
             .positions = corners, .vertex_count = 3, .index_count = 3, .material = materials[i]};
         CHECK(psc_builder_add_mesh(builder, &mesh, &primitives[i], NULL));
     }
-    const float place[3][12] = {{1, 0, 0, 0, 0, 1, 0, 1, 0, 0, 1, 0},
-        {-1, 0, 0, -5, 0, 1, 0, 1, 0, 0, 1, 0}, {2, 0, 0, 5, 0, 2, 0, 1, 0, 0, 2, 0}};
+    const float place[4][12] = {{1, 0, 0, 0, 0, 1, 0, 1, 0, 0, 1, 0},
+        {-1, 0, 0, -5, 0, 1, 0, 1, 0, 0, 1, 0}, {2, 0, 0, 5, 0, 2, 0, 1, 0, 0, 2, 0},
+        {1, 0, 0, 9, 0, 1, 0, 1, 0, 0, 1, 0}};
     psc_builder_add_instance(builder, primitives[0], place[0]);
     psc_builder_add_instance(builder, primitives[0], place[1]); /* mirrored */
     psc_builder_add_instance(builder, primitives[1], place[2]);
+    psc_builder_add_instance(builder, primitives[2], place[2]);
+    psc_builder_add_instance(builder, primitives[3], place[3]);
     static const uint8_t source[PEN_ID_BYTES];
     void *data;
     size_t bytes;
@@ -212,12 +222,14 @@ static void test_scene(void)
     CHECK(psc_builder_finish(builder, source, &data, &bytes, NULL));
     CHECK(psc_open_memory(data, bytes, &scene, NULL));
     CHECK(pen_bvh_build_scene(&scene, 0, &bvh, NULL));
-    CHECK(bvh.triangle_count == 3);
-    for (uint32_t i = 0; i < 3; i++) {
+    CHECK(bvh.triangle_count == 4);
+    for (uint32_t i = 0; i < 4; i++) {
         const struct pen_bvh_triangle *t = &bvh.triangles[i];
-        static const uint32_t flags[3] = {0, PEN_BVH_SWAPPED, PEN_BVH_TWO_SIDED | PEN_BVH_ALPHA};
+        static const uint32_t flags[5] = {
+            0, PEN_BVH_SWAPPED, PEN_BVH_TWO_SIDED | PEN_BVH_ALPHA, ~0u, PEN_BVH_TWO_SIDED};
+        static const uint32_t first[5] = {0, 0, 3, ~0u, 9};
         CHECK(t->flags == flags[t->instance]);
-        CHECK(t->first_index == (t->instance == 2 ? 3u : 0u));
+        CHECK(t->first_index == first[t->instance]);
         CHECK(t->edge2[0] * t->edge1[2] - t->edge1[0] * t->edge2[2] > 0); /* front is up */
     }
     const float up[3] = {0, 2, 0}, down[3] = {0, -2, 0};

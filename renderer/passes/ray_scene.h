@@ -1,0 +1,16 @@
+/* A scene as shaders trace it: storage buffers with the hierarchy and the alpha textures, built
+ * when first needed and kept with the scene until it leaves the GPU. */
+#pragma once
+#include "renderer/technique.h"
+
+struct ray_scene {
+    GLuint nodes, triangles;             /* ray_bvh.glsl */
+    GLuint alpha_triangles, alpha_words; /* ray_alpha.glsl; 0 without alpha */
+    uint32_t node_count;                 /* 0: nothing casts */
+    float extent;                        /* largest absolute coordinate, m */
+};
+
+/* Its memory counts as the scene's. Errors: PEN_TOO_LARGE when it does not fit the budget or a
+ * storage buffer of this device, PEN_INTERNAL. */
+const struct ray_scene *ray_scene_get(struct technique_run *run, struct pen_error *error);
+void ray_scene_bind(const struct ray_scene *scene); /* storage buffers 0, 1, 6, 7 */

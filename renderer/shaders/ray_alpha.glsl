@@ -1,0 +1,77 @@
+// Triangles whose alpha decides: struct ray_alpha_triangle and the words of passes/ray_scene.c. What
+// is computed is what renderer/trace/filter.c computes.
+struct AlphaTriangle {
+    vec2 uv[3];   // transform applied
+    float a[3];   // vertex alpha
+    uint material;
+};
+layout(std430, binding = 6) readonly buffer AlphaTriangles {
+    AlphaTriangle alpha_triangles[];
+};
+// Eight words per material, then texels, four to a word.
+layout(std430, binding = 7) readonly buffer AlphaWords {
+    uint alpha_words[];
+};
+
+const uint ALPHA_NO_TEXELS = 0xffffffffu;
+const uint WRAP_CLAMP = 1u, WRAP_MIRROR = 2u;
+const uint ALPHA_BLEND = 1u, ALPHA_NEAREST = 2u;
+
+uint ray_salt; // hash of the ray; set before it is traced
+
+int alpha_wrap(int i, int size, uint mode)
+{
+    if (mode == WRAP_CLAMP)
+        return clamp(i, 0, size - 1);
+    int period = mode == WRAP_MIRROR ? 2 * size : size;
+    i = i < 0 ? period - 1 - (-1 - i) % period : i % period;
+    return i < size ? i : period - 1 - i;
+}
+
+// Brings a coordinate near the image.
+float alpha_reduce(float t, uint mode)
+{
+    if (mode == WRAP_CLAMP)
+        return clamp(t, -1.0, 2.0);
+    return mode == WRAP_MIRROR ? t - 2.0 * floor(0.5 * t) : t - floor(t);
+}
+
+float alpha_texel(uint first, ivec2 size, uvec2 wrap, ivec2 at)
+{
+    uint x = uint(alpha_wrap(at.x, size.x, wrap.x)), y = uint(alpha_wrap(at.y, size.y, wrap.y));
+    uint i = first + y * uint(size.x) + x;
+    return float(alpha_words[i >> 2u] >> ((i & 3u) * 8u) & 255u);
+}
+
+float alpha_sample(uint first, ivec2 size, uint flags, vec2 uv)
+{
+    uvec2 wrap = uvec2(flags >> 8u, flags >> 16u) & 255u;
+    vec2 s = vec2(alpha_reduce(uv.x, wrap.x), alpha_reduce(uv.y, wrap.y)) * vec2(size);
+    if ((flags & ALPHA_NEAREST) != 0u)
+        return alpha_texel(first, size, wrap, ivec2(floor(s))) / 255.0;
+    vec2 low = floor(s - 0.5), t = s - 0.5 - low;
+    ivec2 i = ivec2(low);
+    float top = mix(alpha_texel(first, size, wrap, i),
+        alpha_texel(first, size, wrap, i + ivec2(1, 0)), t.x);
+    float bottom = mix(alpha_texel(first, size, wrap, i + ivec2(0, 1)),
+        alpha_texel(first, size, wrap, i + ivec2(1, 1)), t.x);
+    return mix(top, bottom, t.y) / 255.0;
+}
+
+bool ray_alpha_hit(uint record, vec2 uv)
+{
+    AlphaTriangle t = alpha_triangles[record];
+    vec3 weight = vec3(1.0 - uv.x - uv.y, uv);
+    uint m = 8u * t.material, first = alpha_words[m + 2u], flags = alpha_words[m + 5u];
+    float alpha = dot(weight, vec3(t.a[0], t.a[1], t.a[2])) * uintBitsToFloat(alpha_words[m]);
+    float threshold = uintBitsToFloat(alpha_words[m + 1u]);
+    if (first != ALPHA_NO_TEXELS) {
+        vec2 s = weight.x * t.uv[0] + weight.y * t.uv[1] + weight.z * t.uv[2];
+        ivec2 size = ivec2(alpha_words[m + 3u], alpha_words[m + 4u]);
+        alpha *= alpha_sample(first, size, flags, s);
+    }
+    // The same answer however often a ray meets the triangle; its mean is a share alpha.
+    if ((flags & ALPHA_BLEND) != 0u)
+        threshold = (float(trace_hash(ray_salt + record * 0x9e3779b9u) >> 8u) + 0.5) / 16777216.0;
+    return alpha >= threshold;
+}

@@ -1,0 +1,29 @@
+// A few rays from every receiver: what they agree on, rows from `first_row`.
+layout(local_size_x = 8, local_size_y = 8) in;
+#include "ray_trace.glsl"
+layout(r8ui, binding = 2) writeonly uniform uimage2D verdicts;
+uniform uint first_row;
+
+void main()
+{
+    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy) + ivec2(0, first_row);
+    if (any(greaterThanEqual(pixel, ivec2(ray.size.xy))))
+        return;
+    RayReceiver r;
+    uint verdict = NO_RECEIVER, seen = 0u, rays = 0u, taken = 0u;
+    if (load_receiver(pixel, ray.pretest, r)) {
+        for (; r.reachable && taken < PRETEST_NET + PRETEST_RIM; taken++) {
+            ivec2 shift = taken < PRETEST_NET ? r.shift : ivec2(0);
+            vec2 s = light_point(points[ray.net.w + taken] ^ shift);
+            if (cosine_to(r, s) > 0.0) {
+                rays++;
+                seen += is_visible(r, direction_to(r, s), ray.pretest.z + taken) ? 1u : 0u;
+            }
+        }
+        bool cut = bvh_cut || (r.reachable && taken < PRETEST_NET + PRETEST_RIM);
+        bool all_seen = seen == PRETEST_NET + PRETEST_RIM;
+        verdict = cut || (seen > 0u && !all_seen) ? MIXED : all_seen ? LIT : UMBRA;
+        count_rays(rays);
+    }
+    imageStore(verdicts, pixel, uvec4(verdict));
+}

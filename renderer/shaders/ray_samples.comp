@@ -1,0 +1,105 @@
+// Some samples for some of the listed receivers; sums are kept between calls. COLOUR sums emission,
+// WEIGHTS weights by G; mirrors renderer/trace/visibility.c.
+layout(local_size_x = 64) in;
+#include "ray_trace.glsl"
+layout(binding = 5) uniform sampler2D emission_texture;
+
+struct RaySums {
+    uint count;            // visible samples
+    float pairs;           // (difference of V within a pair, times its mean weight)^2; -1: finished
+    float weight, visible; // sum w, sum w V
+    vec4 rgb;              // sum w e V
+};
+layout(std430, binding = 3) buffer RayState {
+    RaySums state[];
+};
+uniform uvec4 range; // first entry of the list, entries, first point, points
+uniform uint ends;   // 1: a receiver may stop after this, 2: it must
+
+void finish(ivec2 pixel, inout RaySums sums)
+{
+    uint samples = range.z + range.w;
+    bool all_seen = sums.count == samples;
+#ifdef WEIGHTS
+    float weight = sums.weight, visible = sums.visible;
+#else
+    float weight = float(samples), visible = float(sums.count);
+#endif
+    float error = samples > 1u && weight > 0.0 ? sqrt(sums.pairs) / weight : 0.0;
+    if (ends == 1u && !(error < ray.bias.y))
+        return;
+    sums.pairs = -1.0;
+    vec4 v = vec4(0.0);
+    if (weight > 0.0) {
+        v.a = all_seen ? 1.0 : visible / weight;
+#ifdef COLOUR
+        v.rgb = sums.rgb.rgb / weight;
+#else
+        v.rgb = vec3(v.a);
+#endif
+#ifndef WEIGHTS // nothing hidden: no noise from the emission either
+        if (all_seen)
+            v.rgb = ray.mean.rgb;
+#endif
+    }
+    store(pixel, v, error);
+}
+
+void take_samples(RayReceiver r, bool traced, inout RaySums sums)
+{
+    float last_weight = 0.0;
+    bool last_seen = false;
+    uint rays = 0u, taken = 0u;
+    for (uint i = range.z; i < range.z + range.w; i++) {
+        vec2 s = light_point(points[i] ^ r.shift);
+        vec3 direction = direction_to(r, s);
+        float cosine = cosine_to(r, s), weight = 1.0;
+        bool seen = r.reachable && cosine > 0.0;
+#ifdef WEIGHTS
+        float d2 = dot(direction, direction);
+        weight = seen ? cosine * r.front / (d2 * d2) : 0.0;
+#endif
+        if (seen && traced) {
+            rays++;
+            seen = is_visible(r, direction, ray.net.z + i);
+        }
+        sums.count += seen ? 1u : 0u;
+#ifdef WEIGHTS
+        sums.weight += weight;
+        sums.visible += seen ? weight : 0.0;
+#endif
+#ifdef COLOUR
+        if (seen)
+            sums.rgb.rgb += weight * textureLod(emission_texture, 0.5 * s + 0.5, 0.0).rgb;
+#endif
+        if ((i & 1u) == 0u) {
+            last_seen = seen;
+            last_weight = weight;
+        } else if (seen != last_seen) {
+            float mean = 0.5 * (weight + last_weight);
+            sums.pairs += mean * mean;
+        }
+        taken++;
+    }
+    if (bvh_cut || taken < range.w)
+        counters.cut = 1u;
+    count_rays(rays);
+}
+
+void main()
+{
+    if (gl_GlobalInvocationID.x >= range.y)
+        return;
+    uint entry = list[range.x + gl_GlobalInvocationID.x], number = entry & ~LIST_LIT;
+    ivec2 pixel = ivec2(number % ray.size.x, number / ray.size.x);
+    RaySums sums = RaySums(0u, 0.0, 0.0, 0.0, vec4(0.0));
+    if (range.z != 0u)
+        sums = state[gl_GlobalInvocationID.x];
+    RayReceiver r;
+    if (sums.pairs < 0.0 || !load_receiver(pixel, ray.net, r))
+        return;
+    take_samples(r, (entry & LIST_LIT) == 0u, sums);
+    if (ends != 0u)
+        finish(pixel, sums);
+    state[gl_GlobalInvocationID.x] = sums;
+}

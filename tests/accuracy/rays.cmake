@@ -1,0 +1,2 @@
+penumbra_accuracy_test(rays)
+target_link_libraries(accuracy_rays PRIVATE penumbra_textured)

@@ -116,7 +116,7 @@ def settings(args):
         return (lambda scene: (64, 48)), 16, 1, 5
     if args.quick:
         return (lambda scene: (200, 150)), 256, 3, 20
-    return (lambda scene: (800, 600) if scene.startswith("bunny") else (400, 300)), 1024, 5, 90
+    return (lambda scene: (800, 600) if scene.startswith("bunny") else (400, 300)), 1024, 5, 60
 
 
 def add_arguments(parser):

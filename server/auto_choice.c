@@ -6,7 +6,9 @@
 
 #define RMSE_MARGIN 1.25 /* another resolution and other pixels than those that were measured */
 #define TIME_MARGIN 1.25
+#define TIME_MARGIN_BORROWED 1.6 /* another view may show more of the penumbra */
 #define FEW_OBSERVATIONS 8
+#define MANY_OBSERVATIONS 20
 #define DEFAULT_RMSE 0.02f
 #define MAX_METHODS 63
 
@@ -49,7 +51,9 @@ const struct auto_candidate auto_candidates[] = {
     {"pcf", {{0}}},
     {"pcss", {{0}}},
     {"pcss", {{"search_taps", 32}, {"filter_taps", 64}}},
+    {"vssm", {{0}}},
     {"mssm", {{0}}},
+    {"backprojection", {{0}}},
     {"bilateral", {{0}}},
     {"cascaded", {{0}}},
     {"multisample", {{"samples", 64}}},
@@ -123,18 +127,36 @@ static int compare_floats(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-double auto_correction(const struct auto_observed *observed)
+/* What 19 of 20 stay below; 1 when nothing was seen. */
+static double high_ratio(const struct auto_observed *observed, uint32_t count)
 {
     struct auto_observed sorted = *observed;
-    uint32_t count = sorted.count < AUTO_OBSERVATIONS ? sorted.count : AUTO_OBSERVATIONS;
     if (!count)
         return 1;
     qsort(sorted.ratios, count, sizeof *sorted.ratios, compare_floats);
-    double high = sorted.ratios[(uint32_t)ceil(0.95 * count) - 1];
-    return count < FEW_OBSERVATIONS ? fmax(high, 1) : high;
+    return sorted.ratios[(uint32_t)ceil(0.95 * count) - 1];
 }
 
-static void explain(const struct auto_wish *wish, struct auto_pick *pick)
+static uint32_t count_of(const struct auto_observed *observed)
+{
+    return observed->count < AUTO_OBSERVATIONS ? observed->count : AUTO_OBSERVATIONS;
+}
+
+double auto_correction(const struct auto_observed *own, const struct auto_observed *all)
+{
+    uint32_t own_count = count_of(own), all_count = count_of(all);
+    double high = high_ratio(own, own_count), others = high_ratio(all, all_count);
+    if (own_count >= FEW_OBSERVATIONS)
+        return high;
+    if (all_count < MANY_OBSERVATIONS)
+        others = 1;
+    else if (others < 1)
+        others = 0.5 * (1 + others);
+    return own_count ? fmax(high, others) : others;
+}
+
+static void explain(
+    const struct auto_table *table, const struct auto_wish *wish, struct auto_pick *pick)
 {
     char asked[96];
     int at = 0;
@@ -144,10 +166,11 @@ static void explain(const struct auto_wish *wish, struct auto_pick *pick)
         snprintf(asked + at, sizeof asked - (size_t)at, "%sbudget_ms %g", at ? " and " : "",
             wish->budget_ms);
     snprintf(pick->why, sizeof pick->why,
-        "%s: RMSE %.4f and %.1f ms expected, the %s of what was measured %s %s.", pick->row->key,
+        "%s: RMSE %.4f and %.1f ms expected, the %s of what was measured%s %s %s.", pick->row->key,
         pick->row->rmse, pick->predicted_ms,
         pick->met ? (wish->max_rmse > 0 ? "cheapest" : "most accurate") : "nearest",
-        pick->met ? "that meets" : "as nothing meets", asked);
+        table->borrowed ? " from another view" : "", pick->met ? "that meets" : "as nothing meets",
+        asked);
 }
 
 bool auto_choose(const struct auto_table *table, const struct auto_wish *given, uint64_t pixels,
@@ -158,14 +181,14 @@ bool auto_choose(const struct auto_table *table, const struct auto_wish *given, 
         wish.max_rmse = DEFAULT_RMSE;
     enum { CHEAPEST_MET, ACCURATE_MET, ACCURATE_IN_TIME, FASTEST, ACCURATE, RULES };
     const struct auto_row *best[RULES] = {0};
-    double best_value[RULES];
+    double best_value[RULES], margin = table->borrowed ? TIME_MARGIN_BORROWED : TIME_MARGIN;
     for (uint32_t i = 0; i < table->count; i++) {
         const struct auto_row *row = &table->rows[i];
         double ms = auto_predict(table, row, pixels);
         if (!isfinite(row->rmse) || !isfinite(ms))
             continue;
         bool accurate = !(wish.max_rmse > 0) || row->rmse * RMSE_MARGIN <= wish.max_rmse;
-        bool fast = !(wish.budget_ms > 0) || ms * TIME_MARGIN <= wish.budget_ms;
+        bool fast = !(wish.budget_ms > 0) || ms * margin <= wish.budget_ms;
         const bool applies[RULES] = {wish.max_rmse > 0 && accurate && fast,
             !(wish.max_rmse > 0) && fast, wish.budget_ms > 0 && fast, wish.budget_ms > 0, true};
         const double value[RULES] = {ms, row->rmse, row->rmse, ms, row->rmse};
@@ -183,6 +206,6 @@ bool auto_choose(const struct auto_table *table, const struct auto_wish *given, 
     pick->row = best[rule];
     pick->predicted_ms = auto_predict(table, pick->row, pixels);
     pick->met = rule <= ACCURATE_MET;
-    explain(&wish, pick);
+    explain(table, &wish, pick);
     return true;
 }

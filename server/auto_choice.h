@@ -48,6 +48,8 @@ struct auto_row {
 };
 struct auto_table {
     uint8_t setup[PEN_ID_BYTES]; /* view and lights; see calibration.h */
+    uint8_t cost[PEN_ID_BYTES];  /* the same without the view */
+    bool borrowed;               /* taken for a view other than its own */
     uint32_t pixels;             /* at which the times were taken */
     uint32_t count;
     struct auto_row rows[AUTO_MAX_ROWS];
@@ -64,18 +66,22 @@ struct auto_pick {
  * measured are credited with half of what they should save. */
 double auto_predict(const struct auto_table *table, const struct auto_row *row, uint64_t pixels);
 
-/* What renders took by the side of what was expected: the factor that 19 of 20 of them stay below.
- * Fewer than eight can only make an expectation worse. */
+/* What renders took by the side of what was expected, as factors. */
 #define AUTO_OBSERVATIONS 40
 struct auto_observed {
     uint32_t count; /* ever; the last AUTO_OBSERVATIONS are kept */
     float ratios[AUTO_OBSERVATIONS];
 };
 void auto_observe(struct auto_observed *observed, double expected_ms, double ms);
-double auto_correction(const struct auto_observed *observed);
+/* The factor that 19 of 20 renders of a row (`own`) stay below. Fewer than eight can only make an
+ * expectation worse; as long as there are no more, what was seen of all rows counts too, once there
+ * are twenty: in full when the machine has become slower than it was when it was measured, by half
+ * when it has become faster. */
+double auto_correction(const struct auto_observed *own, const struct auto_observed *all);
 
 /* max_rmse: the cheapest row that stays below it with a quarter to spare. budget_ms: the most
- * accurate row whose expected time leaves a fifth of the budget free. Both: the cheapest that does
+ * accurate row whose expected time leaves a fifth of the budget free (three eighths of it when the
+ * table is that of another view). Both: the cheapest that does
  * both. Nothing does: the most accurate row within the budget, else the fastest; without a budget
  * the most accurate one. False when the table is empty. */
 bool auto_choose(const struct auto_table *table, const struct auto_wish *wish, uint64_t pixels,

@@ -1,8 +1,8 @@
 #include "server/auto_render.h"
+#include "server/auto_history.h"
 #include "server/calibration.h"
 #include "server/clock.h"
 #include "server/compare.h"
-#include "server/hash.h"
 #include "server/log.h"
 #include "server/routes.h"
 #include <math.h>
@@ -14,13 +14,13 @@
 #define GPU_PIXELS (320u * 240u)      /* of the pictures whose error is measured */
 #define SOFTWARE_PIXELS (176u * 132u) /* the same, and of those that are timed */
 #define TIMED_PIXELS (2u << 20)       /* at most, on a GPU */
+#define COLD 3 /* renders that make their shadow inputs anew; they give the error too */
 #define REPEATS 5
-#define SLOW_MS 400 /* a candidate that takes longer is timed once */
+#define STEPS (COLD + REPEATS) /* of one candidate */
+#define SLOW_MS 400            /* a candidate that takes longer is timed once in either way */
 #define PATIENCE_MS 120000
-#define HISTORIES 64
-#define FORGET_NS (600 * CLOCK_S) /* a busy hour must not be held against a row for ever */
-#define MAX_RUNS 4                /* at the same time */
-#define MAX_STEPS (1 + AUTO_MAX_ROWS * (1 + REPEATS))
+#define MAX_RUNS 4 /* at the same time */
+#define MAX_STEPS (1 + AUTO_MAX_ROWS * STEPS)
 
 /* One scene and view being measured, and the calls that wait for it. */
 struct run {
@@ -35,17 +35,11 @@ struct run {
     uint32_t measures[MAX_STEPS];
 };
 
-/* How long a row's renders took lately. */
-struct history {
-    uint8_t key[PEN_ID_BYTES]; /* of view and row */
-    uint64_t last_ns;          /* 0: free */
-    struct auto_observed observed;
-};
-
 struct auto_runs {
-    pthread_mutex_t lock; /* guards what follows, and every run's calls */
+    pthread_mutex_t lock; /* guards the runs and their calls */
     struct run *first;
-    struct history histories[HISTORIES];
+    pthread_mutex_t saving; /* held while the store's tables are written */
+    struct auto_history *history;
 };
 
 struct auto_runs *auto_runs_create(void)
@@ -54,6 +48,8 @@ struct auto_runs *auto_runs_create(void)
     if (!runs)
         abort();
     pthread_mutex_init(&runs->lock, NULL);
+    pthread_mutex_init(&runs->saving, NULL);
+    runs->history = auto_history_create();
     return runs;
 }
 
@@ -61,83 +57,38 @@ void auto_runs_destroy(struct auto_runs *runs)
 {
     if (!runs)
         return;
+    auto_history_destroy(runs->history);
+    pthread_mutex_destroy(&runs->saving);
     pthread_mutex_destroy(&runs->lock);
     free(runs);
 }
 
-/* ---- choosing ---- */
-
-static void history_key(const struct auto_table *table, const struct auto_row *row,
-    const struct call *call, uint8_t key[PEN_ID_BYTES])
-{
-    struct hash *hash = hash_create();
-    const uint32_t size[2] = {call->request.width, call->request.height};
-    hash_add(hash, table->setup, sizeof table->setup);
-    hash_add(hash, row->key, strlen(row->key));
-    hash_add(hash, size, sizeof size);
-    hash_finish(hash, key);
-}
-
-static struct history *find_history(struct auto_runs *runs, const uint8_t key[PEN_ID_BYTES])
-{
-    for (int i = 0; i < HISTORIES; i++) {
-        struct history *h = &runs->histories[i];
-        if (h->last_ns && !memcmp(h->key, key, PEN_ID_BYTES))
-            return clock_now_ns() - h->last_ns < FORGET_NS ? h : NULL;
-    }
-    return NULL;
-}
-
 void auto_runs_observe(struct auto_runs *runs, const struct call *call, double ms)
 {
-    pthread_mutex_lock(&runs->lock);
-    struct history *h = find_history(runs, call->choice_key);
-    if (!h) { /* its own that is out of date, a free one, or the oldest */
-        h = &runs->histories[0];
-        for (int i = 0; i < HISTORIES; i++) {
-            struct history *other = &runs->histories[i];
-            bool own = !memcmp(other->key, call->choice_key, PEN_ID_BYTES);
-            if (own || other->last_ns < h->last_ns)
-                h = other;
-            if (own)
-                break;
-        }
-        memset(h, 0, sizeof *h);
-        memcpy(h->key, call->choice_key, PEN_ID_BYTES);
-    }
-    h->last_ns = clock_now_ns();
-    auto_observe(&h->observed, call->choice_ms, ms);
-    pthread_mutex_unlock(&runs->lock);
+    auto_history_add(runs->history, &call->expected, ms);
 }
 
-/* The table's times as renders of this size have borne them out; `factors` says how. */
-static void correct(struct call *call, struct auto_table *table, double factors[AUTO_MAX_ROWS])
-{
-    struct auto_runs *runs = call->service->auto_runs;
-    for (uint32_t i = 0; i < table->count; i++) {
-        uint8_t key[PEN_ID_BYTES];
-        history_key(table, &table->rows[i], call, key);
-        pthread_mutex_lock(&runs->lock);
-        const struct history *h = find_history(runs, key);
-        factors[i] = h ? auto_correction(&h->observed) : 1;
-        pthread_mutex_unlock(&runs->lock);
-        table->rows[i].fixed_ms *= factors[i];
-        table->rows[i].screen_ms *= factors[i];
-    }
-}
+/* ---- choosing ---- */
 
 /* Takes a method from the table and serves the call. */
 static void serve(struct call *call, const struct auto_table *measured)
 {
     struct auto_table corrected = *measured, *table = &corrected;
+    struct auto_expected expected[AUTO_MAX_ROWS];
     double factors[AUTO_MAX_ROWS];
-    correct(call, table, factors);
     struct auto_wish wish;
     struct auto_pick pick;
     struct pen_error error = {0};
-    memcpy(&wish, call->request.technique_params, sizeof wish);
-    uint64_t pixels = (uint64_t)call->request.width * call->request.height;
-    if (!auto_choose(table, &wish, pixels, &pick)) {
+    const struct pen_request *request = &call->request;
+    for (uint32_t i = 0; i < table->count; i++) { /* times as other renders have borne them out */
+        auto_history_name(
+            table->cost, table->rows[i].key, request->width, request->height, &expected[i]);
+        factors[i] = auto_history_factor(call->service->auto_runs->history, &expected[i]);
+        table->rows[i].fixed_ms *= factors[i];
+        table->rows[i].screen_ms *= factors[i];
+    }
+    memcpy(&wish, request->technique_params, sizeof wish);
+    if (!auto_choose(table, &wish, (uint64_t)request->width * request->height, &pick)) {
         pen_fail(&error, PEN_INTERNAL, "/technique", "No method could be measured on this scene.");
         routes_fail(call, &error, 0);
         return;
@@ -145,8 +96,8 @@ static void serve(struct call *call, const struct auto_table *measured)
     auto_apply(auto_find(pick.row->key), call->service->catalogue, &call->request);
     snprintf(call->choice, sizeof call->choice, "%s", pick.why);
     call->choice_met = pick.met;
-    call->choice_ms = pick.predicted_ms / factors[pick.row - table->rows];
-    history_key(table, pick.row, call, call->choice_key);
+    call->expected = expected[pick.row - table->rows];
+    call->expected.ms = pick.predicted_ms / factors[pick.row - table->rows];
     routes_serve(call);
 }
 
@@ -192,10 +143,17 @@ static void plan_steps(struct run *run, const struct pen_request *asked)
         auto_key(candidate, run->table.rows[run->table.count++].key);
         auto_apply(candidate, catalogue, &small);
         auto_apply(candidate, catalogue, &timed);
-        add_step(run, &small, CHANNEL_NUMBERS);
+        for (int k = 0; k < COLD; k++)
+            add_step(run, &small, CHANNEL_NUMBERS);
         for (int k = 0; k < REPEATS; k++)
             add_step(run, &timed, CHANNEL_PICTURE);
     }
+}
+
+static int compare_floats(const void *a, const void *b)
+{
+    float x = *(const float *)a, y = *(const float *)b;
+    return (x > y) - (x < y);
 }
 
 static double screen_ms(const struct pen_result *result)
@@ -208,6 +166,18 @@ static double screen_ms(const struct pen_result *result)
     return ms;
 }
 
+/* What the shadow inputs cost: the median, because the first one may have compiled programs. */
+static double shadow_ms(const struct compare_row *steps)
+{
+    float ms[COLD];
+    int count = 0;
+    for (int k = 0; k < COLD; k++)
+        if (steps[k].result.error.code == PEN_OK && steps[k].run_ms > 0)
+            ms[count++] = steps[k].result.stage_ms[PEN_STAGE_SHADOW];
+    qsort(ms, (size_t)count, sizeof *ms, compare_floats);
+    return (double)ms[count / 2];
+}
+
 /* The row of one candidate from its steps; false when it could not be measured. Of the repeats the
  * second slowest counts, near what nineteen of twenty stay below; the slowest is the one that met a
  * program for the first time. They find their shadow inputs kept, which a request with another
@@ -215,9 +185,9 @@ static double screen_ms(const struct pen_result *result)
 static bool read_row(const struct compare_row *steps, struct auto_row *row)
 {
     const struct compare_row *slowest = NULL, *second = NULL;
-    if (steps[0].result.error.code != PEN_OK)
+    if (steps[0].result.error.code != PEN_OK || !(steps[0].run_ms > 0))
         return false;
-    for (int k = 1; k <= REPEATS; k++) {
+    for (int k = COLD; k < STEPS; k++) {
         const struct compare_row *step = &steps[k];
         if (step->result.error.code != PEN_OK || !(step->run_ms > 0))
             continue;
@@ -232,10 +202,9 @@ static bool read_row(const struct compare_row *steps, struct auto_row *row)
         return false;
     row->rmse = steps[0].result.comparison.rmse;
     row->screen_ms = fmin(screen_ms(&typical->result), typical->run_ms);
+    double rest_ms = typical->run_ms - row->screen_ms;
     row->fixed_ms =
-        typical->run_ms - row->screen_ms -
-        fmin(typical->result.stage_ms[PEN_STAGE_SHADOW], typical->run_ms - row->screen_ms) +
-        steps[0].result.stage_ms[PEN_STAGE_SHADOW];
+        rest_ms - fmin(typical->result.stage_ms[PEN_STAGE_SHADOW], rest_ms) + shadow_ms(steps);
     return true;
 }
 
@@ -245,7 +214,7 @@ static void read_rows(struct run *run, const struct compare_row *steps)
     run->table.count = 0;
     for (uint32_t i = 0; i < candidates; i++) {
         struct auto_row row = run->table.rows[i];
-        if (read_row(&steps[1 + i * (1 + REPEATS)], &row))
+        if (read_row(&steps[1 + i * STEPS], &row))
             run->table.rows[run->table.count++] = row;
     }
 }
@@ -279,16 +248,31 @@ static void expire_calls(struct run *run)
     }
 }
 
-/* Leaves out what a slow candidate's first picture has told already. */
+/* Leaves out what a slow candidate's first pictures have told already. */
 static bool wants(void *owner, struct compare *compare, uint32_t step)
 {
     struct run *run = owner;
     const struct compare_row *rows = compare_rows(compare);
-    uint32_t repeat = (step - 1) % (1 + REPEATS), first = step - repeat;
+    uint32_t repeat = (step - 1) % STEPS, first = step - repeat;
     expire_calls(run);
     if (repeat && rows[first].result.error.code != PEN_OK)
         return false;
-    return repeat < 2 || rows[first + 1].run_ms < SLOW_MS;
+    if (repeat < COLD)
+        return !repeat || rows[first].run_ms < SLOW_MS;
+    return repeat < COLD + 2 || rows[first + COLD].run_ms < SLOW_MS;
+}
+
+/* A scene that was deleted meanwhile has no place for it; its callers are answered all the same. */
+static void save(struct run *run)
+{
+    struct service *s = run->service;
+    if (!run->table.count)
+        return;
+    pthread_mutex_lock(&s->auto_runs->saving);
+    bool ok = calibration_save(s->store, run->scene, &run->device, &run->table);
+    pthread_mutex_unlock(&s->auto_runs->saving);
+    if (!ok)
+        log_event(LOG_ERROR, "a calibration could not be written to the store");
 }
 
 /* Any thread. */
@@ -300,8 +284,7 @@ static void done(
     struct auto_runs *runs = s->auto_runs;
     if (error->code == PEN_OK) {
         read_rows(run, compare_rows(compare));
-        if (run->table.count && !calibration_save(s->store, run->scene, &run->device, &run->table))
-            log_event(LOG_ERROR, "a calibration could not be written to the store");
+        save(run);
     }
     if (compare)
         compare_destroy(compare);
@@ -339,9 +322,9 @@ static void start(struct run *run)
     done(run, NULL, &error, retry_after_s);
 }
 
-/* Waits for a run that measures this view, or starts one. */
+/* Waits for a run that measures this view, or starts one. `wanted`: setup and cost. */
 static void wait_for_run(
-    struct call *call, const struct pen_device_info *device, const uint8_t setup[PEN_ID_BYTES])
+    struct call *call, const struct pen_device_info *device, const struct auto_table *wanted)
 {
     struct service *s = call->service;
     struct auto_runs *runs = s->auto_runs;
@@ -355,7 +338,7 @@ static void wait_for_run(
     struct run *run = runs->first;
     uint32_t count = 0;
     while (run && (memcmp(run->scene, call->id, PEN_ID_BYTES) ||
-                      memcmp(run->table.setup, setup, PEN_ID_BYTES))) {
+                      memcmp(run->table.setup, wanted->setup, PEN_ID_BYTES))) {
         run = run->next;
         count++;
     }
@@ -372,7 +355,7 @@ static void wait_for_run(
         run->service = s;
         run->device = *device;
         memcpy(run->scene, call->id, PEN_ID_BYTES);
-        memcpy(run->table.setup, setup, PEN_ID_BYTES);
+        run->table = *wanted;
         plan_steps(run, &call->request);
         run->next = runs->first;
         runs->first = run;
@@ -391,8 +374,7 @@ void routes_auto(struct call *call)
     struct service *s = call->service;
     struct pen_device_info device;
     struct auto_wish wish;
-    struct auto_table table;
-    uint8_t setup[PEN_ID_BYTES];
+    struct auto_table table = {0};
     struct pen_error error = {0};
     if (!service_device(s, &device)) {
         pen_fail(&error, PEN_UNAVAILABLE, "", "The worker is still starting.");
@@ -400,11 +382,11 @@ void routes_auto(struct call *call)
         return;
     }
     memcpy(&wish, call->request.technique_params, sizeof wish);
-    calibration_setup(&call->request, setup);
-    /* An error is known only of a view that was measured; a time holds for others too. */
+    calibration_setup(&call->request, table.setup, table.cost);
+    /* An error is known only of a view that was measured; a time nearly holds for others too. */
     bool any = wish.budget_ms > 0 && !(wish.max_rmse > 0);
-    if (calibration_load(s->store, call->id, &device, setup, any, &table))
+    if (calibration_load(s->store, call->id, &device, any, &table))
         serve(call, &table);
     else
-        wait_for_run(call, &device, setup);
+        wait_for_run(call, &device, &table);
 }

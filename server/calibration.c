@@ -17,7 +17,15 @@ struct calibration {
     struct auto_table tables[CALIBRATION_TABLES];
 };
 
-void calibration_setup(const struct pen_request *request, uint8_t setup[PEN_ID_BYTES])
+static void hash_key(const struct pen_request *key, uint8_t digest[PEN_ID_BYTES])
+{
+    struct hash *hash = hash_create();
+    hash_add(hash, key, PEN_REQUEST_KEY_BYTES);
+    hash_finish(hash, digest);
+}
+
+void calibration_setup(
+    const struct pen_request *request, uint8_t setup[PEN_ID_BYTES], uint8_t cost[PEN_ID_BYTES])
 {
     struct pen_request key = *request;
     memset(key.technique, 0, sizeof key.technique);
@@ -28,9 +36,18 @@ void calibration_setup(const struct pen_request *request, uint8_t setup[PEN_ID_B
     key.tone_map = 0;
     key.width = (16 * request->width + request->height / 2) / request->height; /* its shape */
     key.height = 16;
-    struct hash *hash = hash_create();
-    hash_add(hash, &key, PEN_REQUEST_KEY_BYTES);
-    hash_finish(hash, setup);
+    hash_key(&key, setup);
+    memset(&key.camera, 0, sizeof key.camera);
+    key.time_s = 0;
+    for (uint32_t i = 0; i < PEN_MAX_LIGHTS; i++) {
+        struct pen_light *light = &key.lights[i];
+        memset(light->position, 0, sizeof light->position);
+        memset(light->target, 0, sizeof light->target);
+        memset(light->up, 0, sizeof light->up);
+        memset(light->color, 0, sizeof light->color);
+        light->power_w = light->radiance = light->irradiance = 0;
+    }
+    hash_key(&key, cost);
 }
 
 /* Device and build in one word. */
@@ -68,7 +85,8 @@ static bool read_table(const cJSON *item, struct auto_table *table)
     const cJSON *rows = cJSON_GetObjectItemCaseSensitive(item, "rows");
     double pixels = number(item, "pixels");
     memset(table, 0, sizeof *table);
-    if (!pen_id_from_hex(text(item, "setup"), table->setup) || pixels < 1 || pixels > 1e9)
+    if (!pen_id_from_hex(text(item, "setup"), table->setup) ||
+        !pen_id_from_hex(text(item, "cost"), table->cost) || !(pixels >= 1 && pixels <= 1e9))
         return false;
     table->pixels = (uint32_t)pixels;
     for (const cJSON *at = rows ? rows->child : NULL; at && table->count < AUTO_MAX_ROWS;
@@ -117,12 +135,11 @@ static void read_all(int folder, const struct pen_device_info *device, struct ca
 }
 
 bool calibration_load(struct scene_store *store, const uint8_t scene[PEN_ID_BYTES],
-    const struct pen_device_info *device, const uint8_t setup[PEN_ID_BYTES], bool any,
-    struct auto_table *table)
+    const struct pen_device_info *device, bool any, struct auto_table *table)
 {
     struct calibration *all = malloc(sizeof *all);
+    const struct auto_table *found = NULL;
     int folder = open_folder(store, scene);
-    bool found = false;
     if (!all)
         abort();
     all->count = 0;
@@ -131,11 +148,15 @@ bool calibration_load(struct scene_store *store, const uint8_t scene[PEN_ID_BYTE
         close(folder);
     }
     for (uint32_t i = 0; i < all->count && !found; i++)
-        if ((found = !memcmp(all->tables[i].setup, setup, PEN_ID_BYTES)))
-            *table = all->tables[i];
-    if (!found && any && all->count) {
-        *table = all->tables[0];
-        found = true;
+        if (!memcmp(all->tables[i].setup, table->setup, PEN_ID_BYTES))
+            found = &all->tables[i];
+    for (uint32_t i = 0; any && i < all->count && !found; i++)
+        if (!memcmp(all->tables[i].cost, table->cost, PEN_ID_BYTES))
+            found = &all->tables[i];
+    if (found) {
+        bool borrowed = memcmp(found->setup, table->setup, PEN_ID_BYTES) != 0;
+        *table = *found;
+        table->borrowed = borrowed;
     }
     free(all);
     return found;
@@ -154,6 +175,7 @@ static char *write_all(const struct calibration *all, const struct pen_device_in
         const struct auto_table *table = &all->tables[t];
         pen_json_object(&json, NULL);
         pen_json_id(&json, "setup", table->setup);
+        pen_json_id(&json, "cost", table->cost);
         pen_json_uint(&json, "pixels", table->pixels);
         pen_json_array(&json, "rows");
         for (uint32_t r = 0; r < table->count; r++) {

@@ -101,6 +101,11 @@ const struct compare_row *compare_rows(const struct compare *c)
     return c->rows;
 }
 
+uint32_t compare_done_count(const struct compare *c)
+{
+    return c->at;
+}
+
 void compare_destroy(struct compare *c)
 {
     for (uint32_t i = 0; i < c->plan.count; i++) {

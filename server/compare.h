@@ -36,4 +36,6 @@ bool compare_start(struct scheduler *scheduler, const struct compare_plan *plan,
     uint32_t *retry_after_s, struct pen_error *error);
 /* One row per request of the plan. */
 const struct compare_row *compare_rows(const struct compare *compare);
+/* How many requests were through when it ended. */
+uint32_t compare_done_count(const struct compare *compare);
 void compare_destroy(struct compare *compare);

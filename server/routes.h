@@ -2,6 +2,7 @@
  * header to the last byte of its answer. */
 #pragma once
 #include "protocol/routes.h"
+#include "server/auto_history.h"
 #include "server/service.h"
 
 extern const struct http_callbacks routes_callbacks, routes_admin_callbacks;
@@ -29,10 +30,9 @@ struct call {
     struct waiter waiter;
     bool holds_share, wants_record, is_cached;
     struct pen_compare *compare;
-    struct call *next_waiting; /* for a calibration */
-    char choice[256];          /* why this method was taken */
-    uint8_t choice_key[PEN_ID_BYTES];
-    double choice_ms; /* expected */
+    struct call *next_waiting;     /* for a calibration */
+    char choice[256];              /* why this method was taken */
+    struct auto_expected expected; /* of it */
     bool choice_met, is_deferred;
     /* For the log: */
     const char *technique;

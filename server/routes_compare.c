@@ -51,7 +51,15 @@ static void done(
     void *owner, struct compare *compare, const struct pen_error *error, uint32_t retry_after_s)
 {
     struct call *call = owner;
-    if (error->code != PEN_OK)
+    if (error->code == PEN_DEADLINE) {
+        struct pen_error late = {0};
+        pen_fail(&late, PEN_DEADLINE, "/deadline_ms",
+            "The comparison was not done in time: %u of %u images were. Allow more time, or "
+            "compare "
+            "fewer methods or smaller images.",
+            compare_done_count(compare), 1 + call->compare->count);
+        routes_fail(call, &late, retry_after_s);
+    } else if (error->code != PEN_OK)
         routes_fail(call, error, retry_after_s);
     else
         answer(call, compare);

@@ -185,11 +185,26 @@ static int save_row(const struct options *options, const cJSON *row, int number)
     return status;
 }
 
+/* Before the comparison, which may take minutes. */
+static int make_folder(const char *path)
+{
+    struct stat status;
+    if (!mkdir(path, 0777) || (errno == EEXIST && !stat(path, &status) && S_ISDIR(status.st_mode)))
+        return CLI_OK;
+    return cli_fail(CLI_FAILED, "%s cannot be made.", path);
+}
+
+static bool has_pictures(const cJSON *row)
+{
+    return cJSON_IsString(member(member(row, "links"), "image"));
+}
+
 static int save_all(const struct options *options, const cJSON *answer, const char *json)
 {
     const cJSON *methods = member(answer, "methods");
-    if (mkdir(options->out, 0777) && errno != EEXIST)
-        return cli_fail(CLI_FAILED, "%s cannot be made.", options->out);
+    if (!has_pictures(member(answer, "reference")))
+        fputs(
+            "warning: the server kept no pictures: its result cache is off or too small\n", stderr);
     char *path = cli_format("%s/comparison.json", options->out);
     FILE *file = fopen(path, "wb");
     bool ok = file && fputs(json, file) >= 0;
@@ -210,7 +225,9 @@ static int compare(const struct options *options, cJSON *root)
 {
     const struct cli_server *server = &options->server;
     char id[PEN_ID_HEX + 1];
-    int status = cli_upload_scene(server, options->scene, id, NULL);
+    int status = options->out ? make_folder(options->out) : CLI_OK;
+    if (status == CLI_OK)
+        status = cli_upload_scene(server, options->scene, id, NULL);
     if (status == CLI_OK)
         status = cli_upload_textures(server, root);
     if (status != CLI_OK)

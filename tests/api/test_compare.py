@@ -2,9 +2,11 @@
 import json
 import os
 import signal
+import socket
 import struct
 import subprocess
 import threading
+import time
 import unittest
 import zlib
 
@@ -191,8 +193,14 @@ class Compare(unittest.TestCase):
         self.assertEqual(missing.status, 404)
 
     def test_deadline(self):
-        problem = self.compare({**VIEW, "deadline_ms": 1}, 504)
+        problem = self.compare({**VIEW, "techniques": ["hard", "pcss"], "deadline_ms": 1}, 504)
         self.assertEqual(problem["pointer"], "/deadline_ms")
+        self.assertIn("0 of 3 images", problem["detail"])
+        # Half-way through.
+        slow = [{"name": "multisample", "params": {"samples": 1024 - n}} for n in range(20)]
+        problem = self.compare({**VIEW, "techniques": ["none"] + slow, "reference": "none",
+                                "deadline_ms": 1500}, 504)
+        self.assertRegex(problem["detail"], r"[1-9]\d* of 22 images")
         # Nothing is left behind that would keep others from being served.
         image = self.d.render(self.id, {**VIEW, "technique": "hard"})
         self.assertEqual(image.status, 200)
@@ -230,6 +238,43 @@ class Compare(unittest.TestCase):
             capture_output=True, text=True, timeout=60 * harness.SLOW)
         self.assertEqual(wrong.returncode, 3)
         self.assertIn("soft", wrong.stderr)
+
+    def test_client_without_a_folder(self):
+        """A folder that cannot be made is told before anything is rendered; pictures that the
+        server does not keep are told too."""
+        d = Daemon("--result-cache=0")
+        self.addCleanup(d.kill)
+        scene = os.path.join(d.folder, "scene.glb")
+        with open(scene, "wb") as file:
+            file.write(caster_scene())
+        command = [os.path.join(harness.BIN, "penumbra"), "compare", scene, "--server",
+                   "http://127.0.0.1:%d" % d.port, "--techniques", "hard", "--width", "32",
+                   "--height", "24", "--out"]
+        run = subprocess.run(command + [scene], capture_output=True, text=True, timeout=60)
+        self.assertEqual((run.returncode, run.stdout), (1, ""), run.stderr)
+        self.assertEqual(d.metric("penumbra_cache_misses_total"), 0)
+        out = os.path.join(d.folder, "out")
+        run = subprocess.run(command + [out], capture_output=True, text=True,
+                             timeout=60 * harness.SLOW)
+        self.assertEqual(run.returncode, 0, run.stderr)
+        self.assertIn("kept no pictures", run.stderr)
+        self.assertEqual(os.listdir(out), ["comparison.json"])
+
+    def test_client_leaves(self):
+        """When the caller hangs up, the rest is not rendered."""
+        slow = [{"name": "multisample", "params": {"samples": 1024 - n}} for n in range(20)]
+        body = json.dumps({**VIEW, "techniques": slow, "reference": "none"}).encode()
+
+        abandoned = self.d.metric("penumbra_renders_abandoned_total")
+        with socket.create_connection(("127.0.0.1", self.d.port)) as s:
+            s.sendall(b"POST /v1/scenes/%s/compare HTTP/1.1\r\nHost: x\r\nContent-Type: "
+                      b"application/json\r\nContent-Length: %d\r\n\r\n" % (
+                          self.id.encode(), len(body)) + body)
+            harness.wait(lambda: self.d.metric("penumbra_renders_running"))
+        harness.wait(lambda: self.d.metric("penumbra_renders_abandoned_total") == abandoned + 1)
+        time.sleep(0.2)
+        self.assertEqual(self.d.metric("penumbra_renders_running"), 0)
+        self.assertEqual(self.d.metric("penumbra_queue_depth"), 0)
 
     def test_worker_dies(self):
         """A measurement is given to the next worker, like any render."""
@@ -307,6 +352,63 @@ class Auto(unittest.TestCase):
         tight = self.record({"budget_ms": 0.01})
         self.assertEqual(len(tight["warnings"]), 1)
         self.assertIn("nothing meets", tight["warnings"][0])
+
+    def test_kinds_of_view(self):
+        """With a budget alone, times of another view of the same kind will do: a camera or a light
+        that moves is not measured anew for every image, more lights are."""
+        folder = os.path.join(self.d.store, "scenes", self.id)
+
+        def tables():
+            with open(os.path.join(folder, next(iter(self.files())))) as file:
+                return len(json.load(file)["tables"])
+        self.record({"budget_ms": 50000})
+        known = tables()
+        light = VIEW["lights"][0]
+        for moved in ({"camera": {"orbit": {"azimuth_deg": 33}}},
+                      {"lights": [{**light, "position": [0.5, 2.4, 0.4], "power_w": 50}]}):
+            record = self.record({"budget_ms": 50000}, **moved)
+            self.assertIn("from another view", record["choice"])
+        self.assertEqual(tables(), known)
+        record = self.record({"budget_ms": 50000},
+                             lights=[light, {**light, "position": [-0.5, 2.4, 0.4]}])
+        self.assertNotIn("from another view", record["choice"])
+        self.assertEqual(tables(), known + 1)
+
+    def test_restart(self):
+        """A daemon that is started again knows what was measured; from a damaged file it learns
+        nothing, and measures anew."""
+        first = self.record({"max_rmse": 0.05})
+        self.assertEqual(self.d.stop(), 0)
+        self.d.start()
+        self.d.worker()
+        before = self.files()
+        again = self.record({"max_rmse": 0.05})
+        self.assertEqual(self.files(), before)
+        self.assertEqual(again["choice"].split(",")[0].split(":")[1],
+                         first["choice"].split(",")[0].split(":")[1])  # the RMSE
+        path = os.path.join(self.d.store, "scenes", self.id, next(iter(before)))
+        for damage in (b"", b"{", b"[]", b'{"measured_by": 1}', b"\0" * 5000,
+                       b'{"tables": [{"setup": "x"}]}'):
+            with open(path, "wb") as file:
+                file.write(damage)
+            self.record({"max_rmse": 0.05})
+            with open(path) as file:
+                self.assertEqual(len(json.load(file)["tables"]), 1)
+
+    def test_deleted(self):
+        """A scene that goes away while it is measured: an error, and nothing stays behind."""
+        scene = self.d.upload(harness.grid_scene(3, "deleted"))
+        answers = []
+        thread = threading.Thread(target=lambda: answers.append(self.d.render(
+            scene, {**VIEW, "technique": "auto"}, fresh=False)))
+        thread.start()
+        time.sleep(0.3)
+        gone = self.d.call("DELETE", "/v1/scenes/" + scene)
+        thread.join()
+        self.assertEqual(gone.status, 204)
+        self.assertIn(answers[0].status, (200, 404), answers[0].body)
+        self.assertEqual(self.d.get("/v1/scenes/" + scene).status, 404)
+        self.assertEqual(self.d.render(self.id, {**VIEW, "technique": "hard"}).status, 200)
 
     def test_image(self):
         """As an image: the header says what was taken, and the tag is that of the same request."""

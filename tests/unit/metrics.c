@@ -153,6 +153,14 @@ static void test_flip(void)
         last = error;
     }
     CHECK(last > 0.95 && last < 1); /* beyond the knee */
+    /* The same in closed form, from tabulated CIELAB values (D65) of sRGB's green (87.735, -86.183,
+     * 83.179) and blue (32.297, 79.188, -107.860), a and b times L / 100, and of the grey 0.5
+     * (53.389): largest error 203.30^0.7 = 41.276, its knee at 16.510. */
+    double most = pow(55.438 + hypot(75.613 + 25.575, 72.977 + 34.836), 0.7), knee = 0.4 * most;
+    CHECK_NEAR(most, 41.276, 1e-3);
+    CHECK_NEAR(last, 0.95 + 0.05 * (pow(100, 0.7) - knee) / (most - knee), 1e-4);
+    fill(other, 0.5f, 0.5f, 0.5f);
+    CHECK_NEAR(flip(noise, other), 0.95 * pow(53.389, 0.7) / knee, 1e-4);
 
     /* More noise, more error. */
     last = 0;

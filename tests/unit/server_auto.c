@@ -1,5 +1,5 @@
 /* The policy of "auto", on tables made up for the purpose. */
-#include "server/auto_choice.h"
+#include "server/auto_history.h"
 #include "server/calibration.h"
 #include "tests/unit/check.h"
 
@@ -18,6 +18,17 @@ static const struct auto_table table = {.pixels = 10000,
         {"pcss", .rmse = 0.03, .fixed_ms = 2, .screen_ms = 4},
         {"bilateral", .rmse = 0.015, .fixed_ms = 60, .screen_ms = 1},
         {"raytraced samples=64 seed=1", .rmse = 0.004, .fixed_ms = 1, .screen_ms = 40}}};
+
+/* What is known of a view and, with `any`, of its kind. */
+static bool load(struct scene_store *store, const uint8_t *scene,
+    const struct pen_device_info *device, const struct auto_table *wanted, bool any,
+    struct auto_table *got)
+{
+    memset(got, 0, sizeof *got);
+    memcpy(got->setup, wanted->setup, PEN_ID_BYTES);
+    memcpy(got->cost, wanted->cost, PEN_ID_BYTES);
+    return calibration_load(store, scene, device, any, got);
+}
 
 static const char *choose(double max_rmse, double budget_ms, uint64_t pixels, bool *met)
 {
@@ -87,26 +98,88 @@ static void check_both(void)
     CHECK(!met);
 }
 
+static void observe(struct auto_observed *seen, int times, double ms)
+{
+    for (int i = 0; i < times; i++)
+        auto_observe(seen, 10, ms);
+}
+
 static void check_observations(void)
 {
+    static const struct auto_observed nothing;
     struct auto_observed seen = {0};
-    CHECK_NEAR(auto_correction(&seen), 1, 0);
-    for (int i = 0; i < 4; i++)
-        auto_observe(&seen, 10, 5);
-    CHECK_NEAR(auto_correction(&seen), 1, 0); /* too few to be trusted with good news */
-    auto_observe(&seen, 10, 20);
-    CHECK_NEAR(auto_correction(&seen), 2, 1e-6);
-    for (int i = 0; i < 35; i++)
-        auto_observe(&seen, 10, 5);
-    CHECK_NEAR(auto_correction(&seen), 0.5, 1e-6); /* one of forty */
-    for (int i = 0; i < 3; i++)
-        auto_observe(&seen, 10, 30);
-    CHECK_NEAR(auto_correction(&seen), 3, 1e-6); /* three of forty are more than one in twenty */
-    for (int i = 0; i < AUTO_OBSERVATIONS; i++)
-        auto_observe(&seen, 10, 10);
-    CHECK_NEAR(auto_correction(&seen), 1, 1e-6); /* the old ones are forgotten */
-    auto_observe(&seen, 0, 10);                  /* nothing was expected: nothing is learnt */
+    CHECK_NEAR(auto_correction(&seen, &nothing), 1, 0);
+    observe(&seen, 4, 5);
+    CHECK_NEAR(auto_correction(&seen, &nothing), 1, 0); /* too few to be trusted with good news */
+    observe(&seen, 1, 20);
+    CHECK_NEAR(auto_correction(&seen, &nothing), 2, 1e-6);
+    observe(&seen, 35, 5);
+    CHECK_NEAR(auto_correction(&seen, &nothing), 0.5, 1e-6); /* one of forty */
+    observe(&seen, 3, 30);
+    /* Three of forty are more than one in twenty. */
+    CHECK_NEAR(auto_correction(&seen, &nothing), 3, 1e-6);
+    observe(&seen, AUTO_OBSERVATIONS, 10);
+    CHECK_NEAR(auto_correction(&seen, &nothing), 1, 1e-6); /* the old ones are forgotten */
+    auto_observe(&seen, 0, 10);                            /* nothing was expected */
     CHECK(seen.count == 40 + 3 + AUTO_OBSERVATIONS);
+}
+
+/* What other rows took speaks for a row of which little is known. */
+static void check_shared_observations(void)
+{
+    static const struct auto_observed nothing;
+    struct auto_observed slow = {0}, fast = {0}, few = {0}, own = {0};
+    observe(&slow, 20, 15);
+    observe(&fast, 20, 5);
+    observe(&few, 19, 15);
+    CHECK_NEAR(auto_correction(&nothing, &slow), 1.5, 1e-6);
+    CHECK_NEAR(auto_correction(&nothing, &fast), 0.75, 1e-6); /* half of the good news */
+    CHECK_NEAR(auto_correction(&nothing, &few), 1, 0);
+    observe(&own, 7, 12);
+    CHECK_NEAR(auto_correction(&own, &slow), 1.5, 1e-6);
+    CHECK_NEAR(auto_correction(&own, &fast), 1.2, 1e-6);
+    observe(&own, 1, 12); /* eight of its own: the others do not matter */
+    CHECK_NEAR(auto_correction(&own, &slow), 1.2, 1e-6);
+}
+
+/* The same by way of the history, which tells sizes and kinds of view apart. */
+static void check_history(void)
+{
+    struct auto_history *history = auto_history_create();
+    const uint8_t one[PEN_ID_BYTES] = {1}, two[PEN_ID_BYTES] = {2};
+    struct auto_expected pcss = {.ms = 10}, hard = pcss, larger = pcss, other = pcss;
+    auto_history_name(one, "pcss", 400, 300, &pcss);
+    auto_history_name(one, "hard", 400, 300, &hard);
+    auto_history_name(one, "pcss", 800, 600, &larger);
+    auto_history_name(two, "pcss", 400, 300, &other);
+    for (int i = 0; i < 20; i++)
+        auto_history_add(history, &pcss, 30);
+    CHECK_NEAR(auto_history_factor(history, &pcss), 3, 1e-6);
+    CHECK_NEAR(auto_history_factor(history, &hard), 3, 1e-6);
+    CHECK_NEAR(auto_history_factor(history, &larger), 1, 0);
+    CHECK_NEAR(auto_history_factor(history, &other), 1, 0);
+    for (int i = 0; i < 1000; i++) { /* more than are remembered */
+        auto_history_name(two, "pcss", 400, 301 + (uint32_t)i, &other);
+        auto_history_add(history, &other, 20);
+    }
+    CHECK_NEAR(auto_history_factor(history, &other), 2, 1e-6);
+    CHECK_NEAR(auto_history_factor(history, &pcss), 1, 0);
+    auto_history_destroy(history);
+}
+
+/* A table of another view leaves more of the budget free, and says so. */
+static void check_borrowed(void)
+{
+    struct auto_table borrowed = table;
+    struct auto_wish wish = {0, 60};
+    struct auto_pick pick;
+    CHECK(auto_choose(&borrowed, &wish, 10000, &pick));
+    CHECK_STR(pick.row->key, "raytraced samples=64 seed=1"); /* 41 ms */
+    CHECK(!strstr(pick.why, "another view"));
+    borrowed.borrowed = true;
+    CHECK(auto_choose(&borrowed, &wish, 10000, &pick));
+    CHECK_STR(pick.row->key, "pcss");
+    CHECK(strstr(pick.why, "another view") != NULL);
 }
 
 static void check_empty(void)
@@ -168,7 +241,7 @@ static void check_store(const char *folder)
     struct pen_device_info device = {.renderer = "one"}, other = {.renderer = "two"};
     struct auto_table mine = table, got;
     mine.setup[0] = 7;
-    CHECK(!calibration_load(store, scene, &device, mine.setup, true, &got));
+    CHECK(!load(store, scene, &device, &mine, true, &got));
     CHECK(!calibration_save(store, scene, &device, &mine)); /* no such scene */
     bool added = false;
     CHECK(scene_store_stage(store, &staging, &error));
@@ -181,50 +254,69 @@ static void check_store(const char *folder)
     }
     CHECK(scene_store_commit(store, STORE_SCENES, &staging, scene, &added, &error) && added);
     CHECK(calibration_save(store, scene, &device, &mine));
-    CHECK(calibration_load(store, scene, &device, mine.setup, false, &got));
+    CHECK(load(store, scene, &device, &mine, false, &got) && !got.borrowed);
     CHECK(got.count == mine.count && got.pixels == mine.pixels);
     for (uint32_t i = 0; i < got.count; i++) {
         CHECK_STR(got.rows[i].key, mine.rows[i].key);
         CHECK_NEAR(got.rows[i].rmse, mine.rows[i].rmse, 1e-7);
         CHECK_NEAR(got.rows[i].screen_ms, mine.rows[i].screen_ms, 1e-5);
     }
-    CHECK(!calibration_load(store, scene, &other, mine.setup, true, &got));
+    CHECK(!load(store, scene, &other, &mine, true, &got));
     /* Other views push the oldest out. */
     for (uint8_t i = 0; i < CALIBRATION_TABLES; i++) {
         mine.setup[0] = (uint8_t)(8 + i);
         CHECK(calibration_save(store, scene, &device, &mine));
     }
     mine.setup[0] = 7;
-    CHECK(!calibration_load(store, scene, &device, mine.setup, false, &got));
-    CHECK(calibration_load(store, scene, &device, mine.setup, true, &got));
+    CHECK(!load(store, scene, &device, &mine, false, &got));
+    CHECK(load(store, scene, &device, &mine, true, &got) && got.borrowed);
     CHECK(got.setup[0] == 7 + CALIBRATION_TABLES);
+    mine.cost[0] = 1; /* more lights, say */
+    CHECK(!load(store, scene, &device, &mine, true, &got));
     CHECK(scene_store_remove(store, STORE_SCENES, scene, &error));
-    CHECK(!calibration_load(store, scene, &device, mine.setup, true, &got));
+    mine.cost[0] = 0;
+    CHECK(!load(store, scene, &device, &mine, true, &got));
     scene_store_close(store);
+}
+
+/* Which of the two hashes a change of the request changes. */
+static void check_change(
+    const struct pen_request *a, const struct pen_request *b, bool setup, bool cost)
+{
+    uint8_t of_a[2][PEN_ID_BYTES], of_b[2][PEN_ID_BYTES];
+    calibration_setup(a, of_a[0], of_a[1]);
+    calibration_setup(b, of_b[0], of_b[1]);
+    CHECK((memcmp(of_a[0], of_b[0], PEN_ID_BYTES) != 0) == setup);
+    CHECK((memcmp(of_a[1], of_b[1], PEN_ID_BYTES) != 0) == cost);
 }
 
 static void check_setup(void)
 {
-    struct pen_request a = {.width = 800, .height = 600, .antialias = 1}, b = a;
-    uint8_t of_a[PEN_ID_BYTES], of_b[PEN_ID_BYTES];
-    calibration_setup(&a, of_a);
+    const struct pen_request a = {
+        .width = 800, .height = 600, .antialias = 1, .lights_given = 1, .light_count = 1};
+    struct pen_request b = a;
     b.width = 400, b.height = 300, b.exposure_ev = 2;
     memcpy(b.technique, "pcss", 4);
     b.technique_params[3] = 9;
     b.delivery.deadline_ms = 5;
-    calibration_setup(&b, of_b);
-    CHECK(!memcmp(of_a, of_b, sizeof of_a));
+    check_change(&a, &b, false, false);
     b.camera.eye[0] = 1;
-    calibration_setup(&b, of_b);
-    CHECK(memcmp(of_a, of_b, sizeof of_a));
+    check_change(&a, &b, true, false);
+    b = a;
+    b.lights[0].position[1] = 3, b.lights[0].power_w = 10;
+    check_change(&a, &b, true, false);
     b = a;
     b.lights[0].width = 2;
-    calibration_setup(&b, of_b);
-    CHECK(memcmp(of_a, of_b, sizeof of_a));
+    check_change(&a, &b, true, true);
+    b = a;
+    b.light_count = 2;
+    check_change(&a, &b, true, true);
     b = a;
     b.height = 300;
-    calibration_setup(&b, of_b);
-    CHECK(memcmp(of_a, of_b, sizeof of_a));
+    check_change(&a, &b, true, true);
+    b = a;
+    b.antialias = 4;
+    check_change(&a, &b, true, true);
 }
 
 int main(void)
@@ -235,6 +327,9 @@ int main(void)
     check_budget();
     check_both();
     check_observations();
+    check_shared_observations();
+    check_history();
+    check_borrowed();
     check_empty();
     check_candidates();
     check_setup();

@@ -1,4 +1,5 @@
 """What the claims bench and the comparison of methods share: running the plan, statistics."""
+import hashlib
 import json
 import os
 import statistics
@@ -45,31 +46,79 @@ class Plan:
         lines += ["\t".join(["compare", *pair]) for pair in pairs]
         self.groups.append("\n".join(lines + ["run"]))
 
-    def run(self, build, out, device="auto", log="results.jsonl"):
-        """Measures; answers (device, {group: result}). Every group is on disk once it is done."""
+    def run(self, build, out, device="auto", log="results.jsonl", fresh=False):
+        """Measures; answers (device, {group: result}). Every group is on disk once it is done, and
+        is not measured again by the same program on the same device with the same settings, unless
+        `fresh`: a run that was broken off goes on."""
         pictures = os.path.join(out, "pictures")
         os.makedirs(pictures, exist_ok=True)
-        text = "\n".join(list(self.scenes.lines.values()) + self.groups) + "\n"
-        child = subprocess.Popen([os.path.join(build, "bin/penumbra-claims"), "--device", device,
-                                  "--out", pictures], stdin=subprocess.PIPE,
-                                 stdout=subprocess.PIPE, text=True)
-        child.stdin.write(text)
+        program, path = os.path.join(build, "bin/penumbra-claims"), os.path.join(out, log)
+        child = subprocess.Popen([program, "--device", device, "--out", pictures],
+                                 stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        first = child.stdout.readline()
+        if not first:
+            status = child.wait()
+            sys.exit(77 if status == 77 else "penumbra-claims ended with status %d" % status)
+        info = json.loads(first)
+        known = {} if fresh else known_groups(path, info)
+        keys = {text: key_of(program, self.scenes.lines, text) for text in self.groups}
+        kept = {key: known[key] for key in keys.values() if key in known}
+        # What else the machine does belongs to the device.
+        info.update(processors=os.cpu_count(), load=os.getloadavg()[0])
+        wanted = [text for text in self.groups if keys[text] not in kept]
+        if kept:
+            print("%d of %d groups were measured before and are kept (--fresh measures them again)"
+                  % (len(kept), len(self.groups)), file=sys.stderr)
+        results = list(kept.values())
+        with open(path + ".part", "w") as file:
+            for entry in [info] + results:
+                file.write(json.dumps(entry) + "\n")
+        os.replace(path + ".part", path)
+        child.stdin.write("\n".join(list(self.scenes.lines.values()) + wanted) + "\n")
         child.stdin.close()
-        results = []
-        with open(os.path.join(out, log), "w") as file:
-            for line in child.stdout:
-                result = json.loads(line)
-                if not results:  # the device; what else the machine did belongs to it
-                    result.update(processors=os.cpu_count(), load=os.getloadavg()[0])
-                results.append(result)
-                file.write(json.dumps(result) + "\n")
+        with open(path, "a") as file:
+            for text, line in zip(wanted, child.stdout):
+                results.append({**json.loads(line), "key": keys[text]})
+                file.write(json.dumps(results[-1]) + "\n")
                 file.flush()
         status = child.wait()
-        if status == 77:
-            sys.exit(77)
         if status:
             sys.exit("penumbra-claims ended with status %d" % status)
-        return results[0], {group["group"]: group for group in results[1:]}
+        found = {result["key"]: result for result in results}
+        return info, {found[keys[text]]["group"]: found[keys[text]] for text in self.groups}
+
+
+def key_of(program, scene_lines, text):
+    """What a group's result depends on besides the device: program, scene and settings."""
+    digest = hashlib.sha256(text.encode())
+    with open(program, "rb") as file:
+        digest.update(hashlib.sha256(file.read()).digest())
+    scene = scene_lines[text.split("\t")[2]]
+    digest.update(scene.encode())
+    kind, path = scene.split("\t")[2:4]
+    if kind == "file":
+        status = os.stat(path)
+        digest.update(b"%d %d" % (status.st_size, status.st_mtime_ns))
+    return digest.hexdigest()
+
+
+def known_groups(path, info):
+    """{key: result} of an earlier run on this device, as far as it came."""
+    known = {}
+    if not os.path.exists(path):
+        return known
+    with open(path) as file:
+        for number, line in enumerate(file):
+            try:
+                result = json.loads(line)
+            except ValueError:  # broken off while it was written
+                break
+            if number == 0:
+                if any(result.get(key) != info[key] for key in ("device", "gl")):
+                    break
+            elif "key" in result:
+                known[result["key"]] = result
+    return known
 
 
 def failures(groups):

@@ -12,6 +12,22 @@ import report
 import svg
 
 
+STAND_IN = """#!/usr/bin/env python3
+import json, os, sys
+print(json.dumps({"device": "d", "gl": "g", "methods": []}), flush=True)
+for line in sys.stdin:
+    fields = line.split("\\t")
+    if fields[0] == "group":
+        name = fields[1]
+    elif line == "run\\n":
+        if name == "dies":
+            sys.exit(1)
+        with open(os.path.join(os.path.dirname(__file__), "../measured"), "a") as file:
+            file.write(name + "\\n")
+        print(json.dumps({"group": name, "scene": "demo"}), flush=True)
+"""
+
+
 def times(milliseconds):
     return {"gbuffer": [1] * len(milliseconds), "shadow": [0] * len(milliseconds),
             "technique": milliseconds, "shade": [1] * len(milliseconds),
@@ -83,6 +99,41 @@ class Report(unittest.TestCase):
                 self.assertTrue(claim["fair"][0] <= claim["good"][0] <= claim["good"][1] <=
                                 claim["fair"][1], claim["key"])
 
+    def test_a_broken_run_goes_on(self):
+        """The measuring program is a stand-in that dies at a group called "dies"."""
+        with tempfile.TemporaryDirectory() as folder:
+            os.mkdir(os.path.join(folder, "bin"))
+            program = os.path.join(folder, "bin/penumbra-claims")
+            with open(program, "w") as file:
+                file.write(STAND_IN)
+            os.chmod(program, 0o755)
+            counts = os.path.join(folder, "measured")
+
+            def run(names, **more):
+                plan = bench.Plan(folder)
+                for name in names:
+                    plan.group(name, "demo", {"reference": "a=1", "test": "b=%d" % len(name)})
+                return plan.run(folder, folder, **more)[1]
+
+            def measured():
+                with open(counts) as file:
+                    return file.read().split()
+            with self.assertRaises(SystemExit):
+                run(("a", "bb", "dies", "c"))
+            self.assertEqual(measured(), ["a", "bb"])
+            self.assertEqual(list(run(("a", "bb", "c"))), ["a", "bb", "c"])
+            self.assertEqual(measured(), ["a", "bb", "c"])
+            with open(os.path.join(folder, "results.jsonl"), "a") as file:
+                file.write('{"group": "half a li')
+            self.assertEqual(list(run(("c", "a"))), ["c", "a"])
+            self.assertEqual(measured(), ["a", "bb", "c"])
+            run(("a",), fresh=True)
+            self.assertEqual(measured()[3:], ["a"])
+            with open(program, "a") as file:
+                file.write("# another build\n")
+            run(("a",))
+            self.assertEqual(measured()[4:], ["a"])
+
     def test_plots_are_xml(self):
         points = [(0.5, 0.001, "a & b", "reference"), (300, 0.2, "<c>", "shadowmap")]
         tree = xml.fromstring(svg.scatter(points, "ms", "error"))
@@ -92,6 +143,16 @@ class Report(unittest.TestCase):
         self.assertGreater(float(by_x[0].get("cy")), float(by_x[1].get("cy")))
         xml.fromstring(svg.strip([(0.9, 0.8, 1.1, "partly")], (1, float("inf")),
                                  (0.5, float("inf"))))
+
+    def test_labels_are_readable(self):
+        """Thirty labels in a corner: none covers another or a point."""
+        points = [(200 + 37 * i % 90, 200 + 23 * i % 60, "method %d" % i) for i in range(30)]
+        boxes = [box for _, _, box, _ in svg.place_labels(points)]
+        self.assertEqual(len(boxes), len(points))
+        for i, box in enumerate(boxes):
+            self.assertFalse([other for other in boxes[:i] if svg.covers(box, other)])
+            self.assertFalse([p for p in points if svg.covers(box, (p[0] - 4, p[1] - 4, p[0] + 4,
+                                                                    p[1] + 4))])
 
     def test_page(self):
         groups = {"chun-x": group("chun-x", {"cssm": [8.0], "adaptive": [10.5], "fixed": [14.6]})}

@@ -31,7 +31,8 @@ def try_claim(entry, groups):
         if not values:
             continue
         middle, low, high = bench.spread(values)
-        result["scenes"].append({"group": group["group"], "scene": group["scene"],
+        result["scenes"].append({"group": group["group"],
+                                 "scene": group["group"][len(entry["group"]) + 1:],
                                  "median": middle, "low": low, "high": high,
                                  "rounds": len(values),
                                  "verdict": claims_table.judge(entry, middle)})
@@ -69,7 +70,7 @@ def measure(args, mode):
     for name, experiment in EXPERIMENTS.items():
         if not args.papers or name in args.papers.split(","):
             experiment(plan, scale)
-    return plan.run(args.build, args.out, args.device, "claims.jsonl")
+    return plan.run(args.build, args.out, args.device, "claims.jsonl", args.fresh)
 
 
 def load(out, name):

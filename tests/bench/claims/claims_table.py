@@ -46,6 +46,22 @@ def error_ratio(key, numerator, denominator):
     return value
 
 
+def distance_ratio(numerator, denominator):
+    """Of what the SSIM lacks of 1."""
+    def value(group):
+        a, b = comparison(group, numerator), comparison(group, denominator)
+        return [(1 - a["ssim"]) / (1 - b["ssim"])] if a and b and b["ssim"] < 1 else []
+    return value
+
+
+def between(key, first, second):
+    """Ratio of the errors of two comparisons: pairs of variants."""
+    def value(group):
+        a, b = comparison(group, *first), comparison(group, *second)
+        return [a[key] / b[key]] if a and b and b[key] else []
+    return value
+
+
 def subdivided(name):
     def value(group):
         found = variant(group, name)
@@ -156,6 +172,25 @@ PAPERS = [
                   "> 1", "image RMSE against the truth, PCSS over cascaded",
                   error_ratio("image_rmse", "pcss16", "cascaded"), at_least(1, 0.8),
                   ("cascaded", "pcss16"), pair=("cascaded", "pcss16")),
+            claim("ssim-sbfs", "cascaded", "Its pictures have an SSIM close to 1 with those of SBFS.",
+                  "about 1", "SSIM of cascaded with bilateral",
+                  error("ssim", "cascaded", "bilateral"), at_least(0.98, 0.95),
+                  ("cascaded", "bilateral")),
+            claim("ssim-better-sbfs", "cascaded", "Its SSIM with the truth is nearer to 1 than that "
+                  "of SBFS.", "> 1", "1 - SSIM with the truth, bilateral over cascaded",
+                  distance_ratio("bilateral", "cascaded"), at_least(1, 0.8),
+                  ("cascaded", "bilateral")),
+            claim("ssim-better-pcss", "cascaded", "Its SSIM with the truth is nearer to 1 than that "
+                  "of PCSS with 16 samples.", "> 1", "1 - SSIM with the truth, PCSS over cascaded",
+                  distance_ratio("pcss16", "cascaded"), at_least(1, 0.8), ("cascaded", "pcss16")),
+            claim("fassalss-quality", "cascaded", "RMSE and SSIM comparable to those of FASSALSS.",
+                  "about 1", "image RMSE against the truth, cascaded over adaptive-sampling",
+                  error_ratio("image_rmse", "cascaded", "fassalss"), at_most(1.25, 2),
+                  ("cascaded", "fassalss")),
+            claim("pcss-farther", "cascaded", "Its pictures are more like those of SBFS than like "
+                  "those of PCSS.", "> 1", "image RMSE from cascaded, PCSS over bilateral",
+                  between("image_rmse", ("cascaded", "pcss16"), ("cascaded", "bilateral")),
+                  at_least(1, 0.8), ("cascaded", "bilateral", "pcss16")),
             claim("paper-splits", "cascaded", "The same with split planes as the paper prints them, "
                   "corner samples and filters in texels.", "about 1", "SSIM of cascaded as printed",
                   error("ssim", "cascaded-paper"), at_least(0.98, 0.95), ("cascaded-paper",),
@@ -209,8 +244,9 @@ PAPERS = [
         "conditions": "Paper: 512 x 512 map, kernels of 5 and 10 lexels, spherical light, reference "
                       "of 64 light samples, GeForce 7800 GT. Picture size, scene and the taps of its "
                       "PCSS are not stated. Here: 800 x 600, the same map and kernels, a sphere, "
-                      "PCSS with 25 + 25 taps (twice the lookups of kernel 5). Both skip receivers "
-                      "that a min-max pyramid proves lit.",
+                      "PCSS with 25 + 25 taps (twice the lookups of kernel 5), a light of the usual "
+                      "size and one of a quarter of it. Both skip receivers that a min-max pyramid "
+                      "proves lit.",
         "claims": [
             claim("nearer-10", "accumulation", "Nearer to the 64-sample reference than PCSS, as "
                   "published (kernel 10).", "> 1", "visibility RMSE, PCSS over accumulation",
@@ -229,6 +265,9 @@ PAPERS = [
                   "light instead of a kernel.", "-", "visibility RMSE, PCSS over accumulation",
                   error_ratio("rmse", "pcss", "clipped"), at_least(1.1, 0.9), ("pcss", "clipped"),
                   pair=("clipped", "reference")),
+            claim("any-size", "accumulation", "A kernel of 10 is good for every light size.", "good",
+                  "visibility RMSE in the penumbra, kernel 10", error("penumbra_rmse", "paper10"),
+                  at_most(0.05, 0.1), ("paper10",), pair=("paper10", "reference")),
             claim("faster-5", "accumulation", "Faster than PCSS (kernel 5).", "> 1",
                   "time of the passes, PCSS over accumulation", slower("pcss", "paper5", TECHNIQUE),
                   at_least(1.1, 0.9), ("pcss", "paper5")),
@@ -246,7 +285,7 @@ PAPERS = [
                       "taps and triangles with our foliage, hairball and columns, a light of a tenth "
                       "of the usual size (small penumbrae) and the usual one. PCSS does not "
                       "average between pixels; it skips receivers that a min-max pyramid proves lit, "
-                      "which the paper's did not.",
+                      "which the paper's did not. Truth: 256 rays.",
         "claims": [
             claim("wins-small", "erosion-small", "Where penumbrae are small, erosion beats PCSS "
                   "with 64 search taps.", "0.98, 1.01, 1.01",
@@ -275,11 +314,41 @@ PAPERS = [
                   "visibility RMSE, PCSS 32 over erosion, small light",
                   error_ratio("rmse", "pcss32", "erosion"), at_least(0.9, 0.6),
                   ("erosion", "pcss32")),
+            claim("direct-worse", "erosion-small", "The shadow factor taken from the erosion itself "
+                  "still has artefacts; with depth comparisons it has fewer.", "visual",
+                  "visibility RMSE, direct factor over comparisons, small light",
+                  error_ratio("rmse", "direct", "erosion"), at_least(1.05, 0.95),
+                  ("erosion", "direct"), pair=("direct", "erosion")),
             claim("thin", "erosion-wide", "No artefacts of missed blockers, which PCSS with 8 search "
                   "taps has on fine geometry.", "visual",
                   "visibility RMSE, PCSS 8 over erosion, usual light",
                   error_ratio("rmse", "pcss8", "erosion"), at_least(1.0, 0.9),
                   ("erosion", "pcss8"), pair=("erosion", "pcss8")),
+        ],
+    },
+    {
+        "key": "relatives",
+        "title": "Methods that the five papers build on or compare with",
+        "conditions": "Schwarzler et al. 2012: 289 fixed light samples at 10 fps, 25 adaptive ones at "
+                      "67 fps (a far view). Guennebaud et al. 2006: 25 fps where 1024 averaged hard "
+                      "shadows take 2.5 s. Resolutions and scenes are not known to us; here 800 x "
+                      "600 and 1024 x 1024 maps for the first, 512 x 512 pixels and maps and foliage "
+                      "of 50,000 triangles for the second. Shadow inputs are made anew for every "
+                      "image.",
+        "claims": [
+            claim("sampling-time", "cascaded", "Adaptive light sampling (FASSALSS) with 25 samples "
+                  "is 6.7 times as fast as 289 fixed samples.", "6.7",
+                  "time of 289 samples over adaptive sampling", slower("fixed289", "fassalss"),
+                  at_least(5, 3), ("fixed289", "fassalss")),
+            claim("sampling-error", "cascaded", "Its pictures are those of 289 fixed samples.",
+                  "visual", "image RMSE, adaptive sampling from 289 samples",
+                  error("image_rmse", "fassalss", "fixed289"), at_most(0.01, 0.02),
+                  ("fixed289", "fassalss"), pair=("fassalss", "fixed289")),
+            claim("backprojection-time", "backprojection", "Backprojection takes a 60th of the time "
+                  "of 1024 averaged hard shadows.", "62",
+                  "time of 1024 samples over backprojection", slower("fixed1024", "backprojection"),
+                  at_least(40, 15), ("fixed1024", "backprojection"),
+                  pair=("backprojection", "fixed1024")),
         ],
     },
 ]

@@ -115,9 +115,9 @@ static void paint_difference(const struct picture *t, const struct picture *r, u
     for (size_t i = 0; i < (size_t)t->width * t->height; i++) {
         float e = 4 * (t->visibility[4 * i + 3] - r->visibility[4 * i + 3]);
         uint8_t *p = pixels + 4 * i;
-        p[0] = to_byte(1 - fmaxf(e, 0));
+        p[0] = to_byte(1 - fmaxf(-e, 0));
         p[1] = to_byte(1 - fabsf(e));
-        p[2] = to_byte(1 - fmaxf(-e, 0));
+        p[2] = to_byte(1 - fmaxf(e, 0));
         p[3] = 255;
     }
 }

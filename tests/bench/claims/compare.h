@@ -18,6 +18,6 @@ void compare_write(struct pen_json *json, const struct plan_group *group,
     const struct picture *pictures, uint32_t test, uint32_t reference, bool flip);
 
 /* FOLDER/<group>--<variant>.png of every variant, and <group>--<variant>--difference.png of its
- * visibility against the reference: red where too dark, blue where too light, full at 0.25. */
+ * visibility against the reference: red where too light, blue where too dark, full at 0.25. */
 void compare_pictures(
     const char *folder, const struct plan_group *group, const struct picture *pictures);

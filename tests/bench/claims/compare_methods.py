@@ -55,6 +55,7 @@ def table_rows(group):
             times = bench.spread(bench.rounds(group, name, how=how))
             row[how + "_ms"] = times and times[0]
             row[how + "_quartiles_ms"] = times and times[1:]
+            row[how + "_rounds"] = len(bench.rounds(group, name, how=how))
         times = entry.get("moving")
         for stage in bench.FRAME:
             values = times and bench.spread(times[stage])
@@ -115,7 +116,7 @@ def settings(args):
         return (lambda scene: (64, 48)), 16, 1, 5
     if args.quick:
         return (lambda scene: (200, 150)), 256, 3, 20
-    return (lambda scene: (800, 600) if scene.startswith("bunny") else (400, 300)), 1024, 5, 90
+    return (lambda scene: (800, 600) if scene.startswith("bunny") else (400, 300)), 1024, 5, 60
 
 
 def add_arguments(parser):
@@ -126,6 +127,8 @@ def add_arguments(parser):
     parser.add_argument("--quick", action="store_true", help="smaller pictures, fewer rounds")
     parser.add_argument("--seconds", type=float, help="time for the rounds of one group")
     parser.add_argument("--repetitions", type=int, help="timed rounds; 0: errors only")
+    parser.add_argument("--fresh", action="store_true",
+                        help="measure again what an earlier run into the same folder measured")
     parser.add_argument("--tiny", action="store_true", help="only shows that everything runs")
 
 
@@ -145,7 +148,7 @@ def run(args):
     seconds = args.seconds or seconds
     repetitions = repetitions if args.repetitions is None else args.repetitions
     plan_methods(plan, scenes, names, size, samples, repetitions, seconds, ladders=not args.tiny)
-    device, groups = plan.run(args.build, args.out, args.device, "methods.jsonl")
+    device, groups = plan.run(args.build, args.out, args.device, "methods.jsonl", args.fresh)
     write_tables(args.out, device, list(groups.values()))
     return device, groups
 

@@ -15,6 +15,8 @@
 
 #define MAX_ROUNDS 64
 #define SLOW_SHARE 6 /* a variant whose image takes this part of the group's time is slow */
+#define FEW_ROUNDS 5
+#define SETTLED 0.02f /* quartiles this near to the median: more rounds would tell nothing new */
 
 struct timing {
     uint32_t rounds;
@@ -126,6 +128,29 @@ static double frame_seconds(const struct pen_result *result)
     return ms / 1000;
 }
 
+/* Whether the middle half of an image's times lies close to their median. */
+static bool is_settled(const struct timing *timing)
+{
+    float totals[MAX_ROUNDS];
+    uint32_t n = timing->rounds;
+    for (uint32_t r = 0; r < n; r++) {
+        totals[r] = 0;
+        for (uint32_t s = 0; s < PEN_STAGES; s++)
+            if (s != PEN_STAGE_READBACK)
+                totals[r] += timing->ms[s][r];
+    }
+    qsort(totals, n, sizeof *totals, compare_floats);
+    return totals[3 * n / 4] - totals[n / 4] <= 2 * SETTLED * totals[n / 2];
+}
+
+static bool all_settled(const struct plan_group *group, const struct timing *timings)
+{
+    for (uint32_t i = 0; i < group->variant_count; i++)
+        if (timings[i].rounds > 1 && !is_settled(&timings[i]))
+            return false;
+    return true;
+}
+
 /* Interleaved rounds over all variants that work, after one round of warming up. Slow ones take
  * part in a single round, cold: to them warming up matters little. `kept`, when not NULL: of the
  * same image right after, for which shadow inputs need not be made again. */
@@ -137,6 +162,8 @@ static void time_group(struct plan_group *group, const struct picture *pictures,
     uint32_t rounds = group->repetitions < MAX_ROUNDS ? group->repetitions : MAX_ROUNDS;
     for (uint32_t round = 0; round <= rounds; round++) {
         if (round > 2 && seconds_now() - began > group->seconds)
+            break;
+        if (round > FEW_ROUNDS && all_settled(group, moving))
             break;
         for (uint32_t i = 0; i < group->variant_count; i++) {
             struct plan_variant *variant = &group->variants[i];

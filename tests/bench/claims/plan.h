@@ -41,7 +41,8 @@ struct plan_group {
     char name[64], flags[16], settings[512];
     struct plan_scene *scene;
     uint32_t repetitions;
-    double seconds; /* repetitions stop after so long, but there are at least two */
+    double seconds; /* repetitions stop after so long, but there are at least two, and once they
+                       agree closely */
     uint32_t variant_count, pair_count;
     struct plan_variant variants[PLAN_VARIANTS];
     uint32_t pairs[PLAN_PAIRS][2];

@@ -7,9 +7,9 @@ import compare_methods
 import svg
 
 STYLE = """
-:root { --ink: #1c1f23; --soft: #5d6670; --line: #d8dce1; --paper: #fff; --good: #1a7f37;
+:root { color-scheme: light dark; --link: #0a58ca; --ink: #1c1f23; --soft: #5d6670; --line: #d8dce1; --paper: #fff; --good: #1a7f37;
   --fair: #9a6700; --bad: #b42318; --none: #6e7781; --goodfill: #cfeed8; --fairfill: #fbeec2; }
-@media (prefers-color-scheme: dark) { :root { --ink: #e6e8eb; --soft: #9aa4af; --line: #363c44;
+@media (prefers-color-scheme: dark) { :root { color-scheme: light dark; --link: #0a58ca; --ink: #e6e8eb; --soft: #9aa4af; --line: #363c44;
   --paper: #15181c; --good: #4ac26b; --fair: #d4a72c; --bad: #ff7b72; --none: #8b949e;
   --goodfill: #1d4428; --fairfill: #4a3d12; } }
 body { font: 16px/1.5 system-ui, sans-serif; color: var(--ink); background: var(--paper);
@@ -28,15 +28,15 @@ svg text { fill: var(--ink); font: 11px system-ui, sans-serif; }
 svg .tick { fill: var(--soft); } svg .grid { stroke: var(--line); fill: none; }
 svg .axis { font-size: 12px; fill: var(--soft); }
 svg .lead { stroke: var(--soft); stroke-width: .6; fill: none; }
-svg.scatter { width: 100%; max-width: 860px; height: auto; }
+svg.scatter { width: 100%; height: auto; }
 svg circle { fill: currentColor; } svg .bar { stroke: currentColor; stroke-width: 2; fill: none; }
 svg .good { fill: var(--goodfill); } svg .fair { fill: var(--fairfill); }
 svg .shadowmap { color: #2f6fb5; } svg .reference { color: var(--bad); }
 figure { margin: 0; } img { width: 100%; height: auto; display: block; background: #888; }
 .pair, .sheet { display: grid; gap: .8rem; margin: .6rem 0 1.4rem; }
-.pair { grid-template-columns: repeat(auto-fit, minmax(300px, 1fr)); }
+.pair { grid-template-columns: repeat(auto-fill, minmax(240px, 1fr)); }
 .sheet { grid-template-columns: repeat(auto-fill, minmax(200px, 1fr)); }
-nav a { margin-right: 1rem; }
+a { color: var(--link); } nav a { margin-right: 1rem; }
 """
 KIND = {"reproduced": "reproduced", "partly": "partly", "refuted": "refuted"}
 REFERENCES = ("raytraced", "multisample")
@@ -66,7 +66,8 @@ def values_html(entry):
     for scene in entry["scenes"]:
         text = "%.3g" % scene["median"]
         if scene["rounds"] > 1:
-            text += ' <span class="soft">(%.3g to %.3g)</span>' % (scene["low"], scene["high"])
+            text += ' <span class="soft">(%.3g to %.3g, %d rounds)</span>' % (
+                scene["low"], scene["high"], scene["rounds"])
         lines.append('<span class="%s">%s</span> <span class="soft">%s</span>' % (
             scene["verdict"], text, escape(scene["scene"])))
     if entry["scenes"]:
@@ -89,7 +90,7 @@ def pairs_html(out, paper):
             cells = [figure(out, "%s--%s.png" % (scene["group"], name),
                             "%s, %s" % (name, scene["scene"])) for name in entry["pair"]]
             cells += [figure(out, "%s--%s--difference.png" % (scene["group"], name),
-                             "%s, visibility less the reference's: red too dark, blue too light"
+                             "%s, visibility less the reference's: red too light, blue too dark"
                              % name) for name in entry["pair"] if name != "reference"]
             parts.append("<h4>%s</h4><div class=pair>%s</div>" % (escape(entry["text"]),
                                                                   "".join(cells)))
@@ -149,7 +150,8 @@ def table_html(rows):
             escape(row["method"]),
             "".join(cell(row[key], digits) for key, _, digits in compare_methods.COLUMNS),
             cell(row["moving_ms"], 1),
-            "%.1f to %.1f" % tuple(quartiles) if quartiles else "-",
+            "-" if not quartiles else "one round" if row["moving_rounds"] == 1 else
+            "%.1f to %.1f" % tuple(quartiles),
             "".join(cell(row[key], 1) for key in ("kept_ms", "shadow_ms", "technique_ms",
                                                   "shade_ms"))))
     return "".join(out) + "</table></div>"
@@ -176,10 +178,11 @@ def scene_html(out, group):
                            is None else "%s, RMSE %.4f" % (name, errors[name])) for name in names)
     differences = "".join(figure(out, "%s--%s--difference.png" % (group["group"], name), name)
                           for name in names[1:])
-    return ("<h3 id=%s>%s</h3><p>Shadow inputs made anew for every image:</p>%s<p>Shadow inputs "
-            "kept (a still light and scene):</p>%s%s%s<details><summary>Contact sheet</summary>"
-            "<div class=sheet>%s</div></details><details><summary>Visibility less the reference's: "
-            "red too dark, blue too light, full at 0.25</summary><div class=sheet>%s</div></details>"
+    return ("<h3 id=%s>%s</h3><p>Error against time, shadow inputs made anew for every image (blue: "
+            "shadow maps and their filters, red: many samples of the light, drawn or traced):</p>%s"
+            "<p>The same with shadow inputs kept (a still light and scene):</p>%s%s%s<details><summary>Contact "
+            "sheet</summary><div class=sheet>%s</div></details><details><summary>Visibility less the reference's: "
+            "red too light, blue too dark, full at 0.25</summary><div class=sheet>%s</div></details>"
             % (escape(group["group"], True), escape(title), plot(rows, "moving"),
                plot(rows, "kept"), table_html(rows), passes_html(rows), sheet, differences))
 

@@ -3,8 +3,9 @@ have. Colours are left to the page's style sheet."""
 import math
 from html import escape
 
-WIDTH, HEIGHT = 720, 440
-LEFT, RIGHT, TOP, BOTTOM = 64, 130, 16, 48
+WIDTH, HEIGHT = 960, 560
+LEFT, RIGHT, TOP, BOTTOM = 64, 110, 16, 48
+DOT = 5  # px, radius that labels keep clear of
 LABEL = 12  # px, height of a label
 
 
@@ -18,17 +19,34 @@ def decades(low, high):
     return [tick for tick in ticks if first <= tick <= last]
 
 
+def covers(a, b):
+    """Whether two boxes (left, top, right, bottom) overlap."""
+    return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
+
+
+def label_spots(x, y, width):
+    """Boxes for a label of a point, the best first: beside it, above and below, then farther off."""
+    for distance in range(0, 12 * LABEL, LABEL // 2):
+        for up in (0,) if not distance else (-distance, distance):
+            reach = DOT + 3 + distance / 2
+            for left in (x + reach, x - reach - width):
+                yield left, y + up - LABEL / 2, left + width, y + up + LABEL / 2
+        if distance:
+            for up in (-distance - DOT, distance + DOT):
+                yield x - width / 2, y + up - LABEL / 2, x + width / 2, y + up + LABEL / 2
+
+
 def place_labels(points):
-    """Labels beside their points, pushed down until none covers another: (x, y, text)."""
-    placed = []
+    """Labels near their points, so that none covers another or a point, as long as there is room:
+    (x, y, box, text)."""
+    taken = [(x - DOT, y - DOT, x + DOT, y + DOT) for x, y, _ in points]
     for x, y, text in sorted(points, key=lambda point: point[1]):
-        width = 6.2 * len(text)
-        at = y
-        while any(abs(at - other_y) < LABEL and x + 8 < other_x + other_width and
-                  other_x < x + 8 + width for other_x, other_y, other_width in placed):
-            at += 2
-        placed.append((x + 8, at, width))
-        yield x, y, x + 8, at, text
+        spots = list(label_spots(x, y, 6.2 * len(text)))
+        free = (box for box in spots if box[0] > LEFT and box[2] < WIDTH and box[1] > TOP and
+                box[3] < HEIGHT - BOTTOM and not any(covers(box, other) for other in taken))
+        box = next(free, spots[0])
+        taken.append(box)
+        yield x, y, box, text
 
 
 def scatter(points, x_title, y_title):
@@ -66,13 +84,13 @@ def scatter(points, x_title, y_title):
     out.append('<text class="axis" transform="translate(14 %d) rotate(-90)" text-anchor="middle">'
                '%s</text>' % ((TOP + HEIGHT - BOTTOM) / 2, escape(y_title)))
     kinds = {(x_of(x), y_of(y), label): kind for x, y, label, kind in points}
-    for x, y, label_x, label_y, text in place_labels(list(kinds)):
+    for x, y, (left, top, right, bottom), text in place_labels(list(kinds)):
         kind = kinds[(x, y, text)]
         out.append('<g class="%s"><circle cx="%.1f" cy="%.1f" r="4"/>' % (escape(kind, True), x, y))
-        if label_y > y + 6:
-            out.append('<path class="lead" d="M%.1f %.1fL%.1f %.1f"/>' % (x, y, label_x - 1,
-                                                                         label_y))
-        out.append('<text x="%.1f" y="%.1f">%s</text></g>' % (label_x, label_y + 4, escape(text)))
+        end_x, end_y = min(max(x, left), right), (top + bottom) / 2
+        if math.hypot(end_x - x, end_y - y) > LABEL + DOT:
+            out.append('<path class="lead" d="M%.1f %.1fL%.1f %.1f"/>' % (x, y, end_x, end_y))
+        out.append('<text x="%.1f" y="%.1f">%s</text></g>' % (left, bottom - 2, escape(text)))
     return "".join(out) + "</svg>"
 
 

@@ -4,8 +4,18 @@
 #include "depth_unit.glsl"
 #include "moments.glsl"
 #include "sat.glsl"
+#include "horizon.glsl"
 #include "classify.glsl"
 #include "taps.glsl"
+
+struct Receiver {
+    vec2 q;
+    ReceiverPlane plane;
+    HorizonBack back;
+    vec2 bias;   // in unit depth and in hardware depth
+    vec3 p, n;
+    float light; // 1 where window positions stand for points of the emitter (F2), 0 in the search
+};
 
 // Shares of a part of a window, and what they are worth in depth.
 struct Share {
@@ -16,7 +26,7 @@ struct Share {
 // One square of the quadtree: low, high in texels of the table. `exact`: corners count by the part of
 // the texel, else whole texels do. False when it has to be split.
 bool evaluate(
-    vec2 low, vec2 high, bool exact, int level, vec2 shift, vec2 q, ReceiverPlane plane, float bias, out Share share)
+    vec2 low, vec2 high, bool exact, int level, vec2 shift, Receiver r, out Share share)
 {
     vec2 texel = sat_texel();
     if (!exact) {
@@ -25,12 +35,12 @@ bool evaluate(
         low = min(low, high - 1.0);
     }
     vec2 extent = 0.5 * (high - low) * texel;
-    vec2 offset = 0.5 * (low + high) * texel + light.rect.xy - q;
-    PlaneInWindow t = plane_in_window(plane, offset, extent + 0.5 * texel, bias);
+    vec2 offset = 0.5 * (low + high) * texel + light.rect.xy - r.q;
+    PlaneInWindow t = plane_in_window(r.plane, offset, extent + 0.5 * texel, r.bias.x);
     vec2 range = vec2(0.0, 1.0);
     bool lit = false, blocked = false;
     if (P(subdivide) != SUBDIVIDE_OFF) {
-        range = min_max_window(q + offset, extent);
+        range = min_max_window(r.q + offset, extent);
         range = vec2(depth_unit_of_z(range.x), depth_unit_of_z(range.y));
         lit = range.x >= t.highest;
         blocked = range.y < t.lowest;
@@ -48,35 +58,43 @@ bool evaluate(
             share = Share(0.0, 1.0, m.x);
         if (P(subdivide) == SUBDIVIDE_OFF)
             break;
-        // Nothing sticks out of a small part of the receiver: the mean decides, which a slope
-        // leaves alone. For the whole window classify_window() has looked closer.
-        if (level > 0 && planar && range.x >= t.lowest)
+        // Nothing sticks out of a small part of the receiver: it is lit, however its slope spreads
+        // the depths. For the whole window classify_window() has looked closer.
+        if (level > 0 && range.x >= t.lowest) {
             lit = true;
+            share = Share(1.0, 0.0, 0.0);
+        }
         // Mean and variance place all blockers at one depth; when that is not where the nearest
         // ones are, there are no two planes here.
         float ratio = (m.y - 2.0 * t.mean * m.x + t.mean * t.mean) / max(d * (t.mean - range.x), 1e-12);
         bool two_planes = abs(ratio - 1.0) < P(tolerance);
-        ok = lit || blocked || (!planar && two_planes);
+        ok = lit || (r.back.depth < 0.0 && (blocked || (!planar && two_planes)));
         share.blocker_depth = clamp(
             share.blocker_depth, share.blocked * max(range.x, 0.0), share.blocked * t.highest);
     }
     return ok;
 }
 
-// The same by depth comparisons on a grid.
-Share compare(vec2 low, vec2 high, vec2 shift, vec2 q, ReceiverPlane plane, float bias)
+// The same by depth comparisons on a grid. Points of the emitter below the receiver's horizon are left
+// out. `extent`: of the whole window.
+Share compare(vec2 low, vec2 high, vec2 shift, vec2 extent, Receiver r)
 {
     Share share = Share(0.0, 0.0, 0.0);
     vec2 texel = sat_texel(), map_texel = light_texel(shadow_map);
+    // Depth within a texel differs from its centre's by half a texel along the slope.
+    float bias = r.bias.y + 0.5 * dot(abs(r.plane.gradient), map_texel);
     for (int i = 0; i < P(leaf_grid) * P(leaf_grid); i++) {
         vec2 at = (vec2(i % P(leaf_grid), i / P(leaf_grid)) + shift) / float(P(leaf_grid));
         vec2 l = (floor(mix(low, high, at) * texel / map_texel) + 0.5) * map_texel;
         l += light.rect.xy;
+        vec2 offset = l - r.q;
         float d = texture(shadow_map, light_uv(l)).r;
-        bool blocked = d < plane_depth(plane, l - q, bias);
-        share.lit += blocked ? 0.0 : 1.0;
-        share.blocked += blocked ? 1.0 : 0.0;
-        share.blocker_depth += blocked ? depth_unit(d) : 0.0;
+        bool blocked = d < plane_depth(r.plane, offset, bias) && d > back_depth(r.back, offset);
+        bool above = horizon_height(r.p, r.n, clamp(offset / extent, -1.0, 1.0)) > 0.0;
+        float weight = r.light == 0.0 || above ? 1.0 : 0.0;
+        share.lit += blocked ? 0.0 : weight;
+        share.blocked += blocked ? weight : 0.0;
+        share.blocker_depth += blocked ? weight * depth_unit(d) : 0.0;
     }
     float scale = 1.0 / float(P(leaf_grid) * P(leaf_grid));
     return Share(share.lit * scale, share.blocked * scale, share.blocker_depth * scale);
@@ -88,14 +106,13 @@ int even_bits(int m) // of a Morton number
 }
 
 // Walks the quadtree over q +- extent depth-first. What lies outside the map is lit.
-Share window_share(
-    vec2 q, vec2 extent, bool exact, vec2 shift, ReceiverPlane plane, vec2 bias)
+Share window_share(vec2 extent, bool exact, vec2 shift, Receiver r)
 {
     const int first = P(subdivide) == SUBDIVIDE_UNIFORM ? P(levels) : 0;
     const int last = P(subdivide) == SUBDIVIDE_OFF ? 0 : P(levels);
     vec2 texel = sat_texel();
-    vec2 low = clamp((q - extent - light.rect.xy) / texel, 0.0, sat_info.y);
-    vec2 high = clamp((q + extent - light.rect.xy) / texel, 0.0, sat_info.y);
+    vec2 low = clamp((r.q - extent - light.rect.xy) / texel, 0.0, sat_info.y);
+    vec2 high = clamp((r.q + extent - light.rect.xy) / texel, 0.0, sat_info.y);
     vec2 size = high - low;
     float inside = size.x * size.y * texel.x * texel.y / (4.0 * extent.x * extent.y);
     Share sum = Share(1.0 - min(inside, 1.0), 0.0, 0.0);
@@ -104,7 +121,7 @@ Share window_share(
         vec2 step = size * exp2(-float(level));
         vec2 a = low + vec2(even_bits(m), even_bits(m >> 1)) * step, b = min(a + step, high);
         Share share;
-        bool ok = evaluate(a, b, exact && level == 0, level, shift, q, plane, bias.x, share);
+        bool ok = evaluate(a, b, exact && level == 0, level, shift, r, share);
         // Squares below a texel hold nothing new.
         if (!ok && level < last && min(step.x, step.y) > 1.0) {
             level++;
@@ -112,7 +129,7 @@ Share window_share(
             continue;
         }
         if (!ok)
-            share = compare(a, b, shift, q, plane, bias.y);
+            share = compare(a, b, shift, extent, r);
         float area = inside * exp2(-2.0 * float(level));
         sum.lit += area * share.lit;
         sum.blocked += area * share.blocked;
@@ -130,10 +147,10 @@ vec4 visibility(Surface s)
 {
     vec2 q = light_project(s.p), texel = sat_texel(), least = P(min_filter) * texel;
     vec2 widest = 0.5 * sat_info.zw * texel;
-    ReceiverPlane plane = receiver_plane(s.p, s.n);
-    // In unit depth and in hardware depth.
     vec2 bias = P(bias) * s.p.z *
         vec2(1.0 / (light.far_z - light.near_z), light_depth_slope(s.p.z));
+    Receiver r = Receiver(
+        q, receiver_plane(s.p, s.n), horizon_back(s.p, s.n, bias.y), bias, s.p, s.n, 0.0);
     // The square as large as the disk.
     float shape = light.shape == SHAPE_DISK ? 0.88622693 : 1.0;
     vec2 extent;
@@ -148,14 +165,16 @@ vec4 visibility(Surface s)
     int steps = 2;
     if (P(subdivide) != SUBDIVIDE_OFF) {
         bool lit, blocked;
-        classify_window(q, extent, plane, bias.x, lit, blocked);
+        classify_window(q, extent, r.plane, bias.x, lit, blocked);
+        blocked = blocked && r.back.depth < 0.0;
         v = lit ? 1.0 : 0.0;
         steps = lit || blocked ? 0 : 2;
     }
     for (int i = 0; i < steps; i++) {
         extent = min(max(extent * shape, least), widest);
-        Share share = window_share(q, extent, i > 0 || P(subdivide) == SUBDIVIDE_OFF, shift, plane, bias);
-        v = share.lit / (share.lit + share.blocked);
+        r.light = float(i);
+        Share share = window_share(extent, i > 0 || P(subdivide) == SUBDIVIDE_OFF, shift, r);
+        v = share.lit / max(share.lit + share.blocked, 1e-6);
         if (i == 0) {
             // Nothing blocks, or everything does: the filter would say the same.
             if (v > 0.999)

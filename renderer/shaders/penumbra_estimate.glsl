@@ -3,26 +3,7 @@
 #include "penumbra.glsl"
 #include "blockers.glsl"
 #include "light_gauss.glsl"
-#include "horizon.glsl"
-
-// Share of the light above the horizon that a receiver sees which turns its back to the light's
-// centre: the comparison there says nothing of it.
-float turned_lit(Surface s, ReceiverPlane plane, HorizonBack back, vec2 extent, vec2 uv, float bias)
-{
-    vec2 inverse_size = 1.0 / (light.rect.zw - light.rect.xy);
-    float lit = 0.0, all = 0.0;
-    int count = back.depth > 0.0 ? P(search_taps) : 0;
-    Taps taps = taps_begin(P(search_taps), vec2(0.5));
-    for (int i = 0; i < count; i++) {
-        vec2 e = taps_next(taps), offset = e * extent;
-        float d = texture(shadow_map, uv + offset * inverse_size).r;
-        bool blocked = d < plane_depth(plane, offset, bias) && d > back_depth(back, offset);
-        float above = horizon_height(s.p, s.n, e) > 0.0 ? 1.0 : 0.0;
-        lit += blocked ? 0.0 : above;
-        all += above;
-    }
-    return lit / max(all, 1.0);
-}
+#include "light_pcf.glsl"
 
 vec4 visibility(Surface s)
 {
@@ -35,7 +16,10 @@ vec4 visibility(Surface s)
         discard;
     vec2 extent = blocker_extent(s, plane, search, light_uv(q), least, bias);
     HorizonBack back = horizon_back(s.p, s.n, bias);
-    float turned = turned_lit(s, plane, back, search.extent, light_uv(q), bias);
+    // The comparison says nothing of a receiver that turns its back to the light's centre.
+    int count = back.depth > 0.0 ? P(search_taps) : 0;
+    float turned = light_pcf(s, plane, back, light_uv(q), search.extent, bias, count, P(search_taps),
+        vec2(0.5));
     float hard = hard_lit(s, plane, q, texel, bias, depth) ? 1.0 : 0.0;
     vec3 spread = screen_spread(
         pixels_per_map(s), light_gauss_deviation * extent, light_gauss_deviation * float(P(max_radius)));

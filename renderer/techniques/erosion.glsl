@@ -1,8 +1,7 @@
 // Klein et al. 2014, variant pcf: the penumbra grows from the edges of the hard shadow by their own
 // width, found in the edge pyramid, and percentage-closer filtering runs only there.
-#include "taps.glsl"
+#include "light_pcf.glsl"
 #include "dither.glsl"
-#include "horizon.glsl"
 #include "erosion_window.glsl"
 layout(binding = 7) uniform sampler2D hard_map;
 layout(binding = 8) uniform sampler2D edge_pyramid; // trilinear
@@ -43,7 +42,7 @@ vec4 visibility(Surface s)
     float w = hard.z > 0.0 ? edge_within(s.pixel, radius) : 0.0;
     radius = clamp(w * hard.w, 1.5, radius);
     w = w > 0.0 ? edge_within(s.pixel, radius) : 0.0;
-    float bias = P(bias) * s.p.z * light_depth_slope(s.p.z), lit = 0.0, all = 0.0;
+    float bias = P(bias) * s.p.z * light_depth_slope(s.p.z);
     HorizonBack back = horizon_back(s.p, s.n, bias);
     // Where the light's centre sees the receiver's back there is no edge to grow from, and all that
     // may block counts.
@@ -51,7 +50,6 @@ vec4 visibility(Surface s)
     int count = turned || w > 0.0 ? P(filter_taps) : 0;
 
     vec2 q = light_project(s.p), texel = light_texel(shadow_map);
-    vec2 inverse_size = 1.0 / (light.rect.zw - light.rect.xy), uv = light_uv(q);
     if (w > 0.0)
         w = min(edge_mean(s.pixel, radius), min(hard.z, float(P(max_radius)) / hard.w));
     w = turned ? hard.z : w;
@@ -62,16 +60,9 @@ vec4 visibility(Surface s)
 #else
     vec2 shift = vec2(0.5);
 #endif
-    Taps taps = taps_begin(P(filter_taps), shift);
-    for (int i = 0; i < count; i++) {
-        vec2 e = taps_next(taps), offset = e * extent;
-        float d = texture(shadow_map, uv + offset * inverse_size).r;
-        bool blocked = d < plane_depth(plane, offset, bias) && d > back_depth(back, offset);
-        float above = horizon_height(s.p, s.n, e) > 0.0 ? 1.0 : 0.0;
-        lit += blocked ? 0.0 : above;
-        all += above;
-    }
-    float v = count > 0 ? lit / max(all, 1.0) : max(hard.x, 0.0);
+    float filtered =
+        light_pcf(s, plane, back, light_uv(q), extent, bias, count, P(filter_taps), shift);
+    float v = count > 0 ? filtered : max(hard.x, 0.0);
 #ifdef INTERLEAVED
     return vec4(v, count > 0 ? 2.0 * w * hard.w : 0.0, 0.0, 1.0);
 #else

@@ -1,7 +1,6 @@
 // Fernando 2005 with exact projections (F3, F4 of the light frame) and the receiver's plane.
-#include "taps.glsl"
+#include "light_pcf.glsl"
 #include "min_max.glsl"
-#include "horizon.glsl"
 
 vec4 visibility(Surface s)
 {
@@ -27,24 +26,12 @@ vec4 visibility(Surface s)
             blockers += 1.0;
         }
     }
-    // The loop below runs zero times where nothing blocks: a dynamic bound skips it, a return
-    // would not (software rasterisers run all lanes to the end).
+    // The filter runs zero times where nothing blocks: a dynamic bound skips it, a return would not
+    // (software rasterisers run all lanes to the end).
     float caster_z = min(sum / max(blockers, 1.0), s.p.z);
     vec2 extent = max(light_filter_extent(caster_z, s.p.z), P(min_filter) * texel);
     int count = blockers > 0.0 ? P(filter_taps) : 0;
-    taps = taps_begin(P(filter_taps), shift);
-    // A tap stands for the point of the light that it can hide (F2); those below the receiver's
-    // horizon are left out of the mean.
-    float lit = 0.0, all = 0.0;
-    for (int i = 0; i < count; i++) {
-        vec2 e = taps_next(taps), offset = e * extent;
-        float d = texture(shadow_map, uv + offset * inverse_size).r;
-        bool blocked = d < plane_depth(plane, offset, bias) && d > back_depth(back, offset);
-        float above = horizon_height(s.p, s.n, e) > 0.0 ? 1.0 : 0.0;
-        lit += blocked ? 0.0 : above;
-        all += above;
-    }
-    float v = count > 0 ? lit / max(all, 1.0) : 1.0;
+    float v = light_pcf(s, plane, back, uv, extent, bias, count, P(filter_taps), shift);
 #ifdef INTERLEAVED
     // Width of the penumbra on the screen, F5, for the averaging pass.
     float scale = light_parallel ? 1.0 : s.p.z / light.near_z;

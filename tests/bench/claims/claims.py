@@ -84,7 +84,7 @@ def main():
     parser.add_argument("--only", choices=("claims", "methods", "report"))
     parser.add_argument("--papers", help="keys, joined by commas: " + ", ".join(EXPERIMENTS))
     args = parser.parse_args()
-    args.scenes = args.techniques = None
+    args.scenes = args.techniques = args.reference = None
     mode = "tiny" if args.tiny else "quick" if args.quick else "full"
     os.makedirs(args.out, exist_ok=True)
     written = os.path.join(args.out, "claims.json")

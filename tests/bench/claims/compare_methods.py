@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
-"""Every method on every scene against ray tracing: errors and times as JSON and Markdown.
+"""Every method on every scene against a reference: errors and times as JSON and Markdown.
 
 compare_methods.py --build DIR --out DIR [--quick | --tiny] [--scenes a,b] [--techniques a,b]
+                   [--reference SETTINGS]
 """
 import argparse
 import json
@@ -24,12 +25,12 @@ COLUMNS = (("rmse", "RMSE", 4), ("penumbra_rmse", "RMSE penumbra", 4), ("ssim", 
            ("flip", "FLIP", 4))
 
 
-def plan_methods(plan, scenes, techniques, size, samples, repetitions, seconds, ladders=True):
+def plan_methods(plan, scenes, techniques, size, reference, repetitions, seconds, ladders=True):
     for scene in scenes:
         if not plan.scenes.has(scene):
             continue
         width, height = size(scene)
-        variants = {"reference": "technique=raytraced&samples=%d&seed=7" % samples}
+        variants = {"reference": reference}
         variants.update((name, "technique=" + name) for name in techniques)
         if ladders:
             variants.update((name, text) for name, text in LADDERS.items()
@@ -69,13 +70,13 @@ def number(value, digits):
     return "-" if value is None else "%.*f" % (digits, value)
 
 
-def markdown(device, groups):
-    lines = ["# Every method against ray tracing", "",
-             "Device: %s, OpenGL %s. Reference: the light ray traced. RMSE: of mean visibility, all "
+def markdown(device, groups, reference):
+    lines = ["# Every method against a reference", "",
+             "Device: %s, OpenGL %s. Reference: %s. RMSE: of mean visibility, all "
              "pixels, and where the reference is between 0.02 and 0.98. SSIM and FLIP: of the "
              "finished picture. ms: median of an image, G-buffer to shading, with the shadow inputs "
              "made anew (moving) and kept; the methods took turns, so compare within a table only.%s"
-             % (device["device"], device["gl"], " %d processors, load average %.1f." % (
+             % (device["device"], device["gl"], reference, " %d processors, load average %.1f." % (
                  device["processors"], device["load"]) if "load" in device else "")]
     for group in groups:
         lines += ["", "## %s, %d x %d, %d triangles" % (
@@ -93,11 +94,11 @@ def markdown(device, groups):
     return "\n".join(lines) + "\n"
 
 
-def write_tables(out, device, groups):
+def write_tables(out, device, groups, reference):
     with open(os.path.join(out, "methods.md"), "w") as file:
-        file.write(markdown(device, groups))
+        file.write(markdown(device, groups, reference))
     with open(os.path.join(out, "methods.json"), "w") as file:
-        json.dump({"device": device["device"], "gl": device["gl"],
+        json.dump({"device": device["device"], "gl": device["gl"], "reference": reference,
                    "scenes": [{"scene": group["scene"], "width": group["width"],
                                "height": group["height"], "triangles": group["triangles"],
                                "methods": table_rows(group)} for group in groups]}, file, indent=1)
@@ -147,9 +148,10 @@ def run(args):
     size, samples, repetitions, seconds = settings(args)
     seconds = args.seconds or seconds
     repetitions = repetitions if args.repetitions is None else args.repetitions
-    plan_methods(plan, scenes, names, size, samples, repetitions, seconds, ladders=not args.tiny)
+    reference = args.reference or "technique=raytraced&samples=%d&seed=7" % samples
+    plan_methods(plan, scenes, names, size, reference, repetitions, seconds, ladders=not args.tiny)
     device, groups = plan.run(args.build, args.out, args.device, "methods.jsonl", args.fresh)
-    write_tables(args.out, device, list(groups.values()))
+    write_tables(args.out, device, list(groups.values()), reference)
     return device, groups
 
 
@@ -158,6 +160,8 @@ def main():
     add_arguments(parser)
     parser.add_argument("--scenes", help="names, joined by commas")
     parser.add_argument("--techniques", help="names, joined by commas")
+    parser.add_argument("--reference", help="settings of what all methods are compared with, as in "
+                        "a query string; default: ray traced")
     args = parser.parse_args()
     _, groups = run(args)
     print(os.path.join(args.out, "methods.md"))

@@ -20,7 +20,9 @@
 #define SLOW_MS 400            /* a candidate that takes longer is timed once in either way */
 #define PATIENCE_MS 120000
 #define MAX_RUNS 4 /* at the same time */
-#define MAX_STEPS (1 + AUTO_MAX_ROWS * STEPS)
+#define PROBES 3   /* of the G-buffer at PROBE_SCALE times as many pixels */
+#define PROBE_SCALE 4
+#define MAX_STEPS (1 + AUTO_MAX_ROWS * STEPS + PROBES)
 
 /* One scene and view being measured, and the calls that wait for it. */
 struct run {
@@ -29,8 +31,8 @@ struct run {
     struct pen_device_info device;
     uint8_t scene[PEN_ID_BYTES];
     struct auto_table table;
-    struct call *waiting; /* guarded by auto_runs.lock */
-    uint32_t steps;
+    struct call *waiting;                 /* guarded by auto_runs.lock */
+    uint32_t steps, probes, probe_pixels; /* probes: the first of them; none: steps */
     struct pen_request requests[MAX_STEPS];
     uint32_t measures[MAX_STEPS];
 };
@@ -118,7 +120,21 @@ static void add_step(struct run *run, const struct pen_request *request, uint32_
     run->measures[run->steps++] = measure;
 }
 
-/* The reference, then every candidate: its error, and its time a few times. */
+/* The G-buffer's time is mostly that of triangles: where times are taken of a smaller picture than
+ * was asked for, a second size tells how much of it grows with the pixels. */
+static void plan_probes(struct run *run, const struct pen_request *asked)
+{
+    struct pen_request larger = *asked;
+    if ((uint64_t)asked->width * asked->height <= run->table.pixels || !run->table.count)
+        return;
+    limit_pixels(&larger, PROBE_SCALE * run->table.pixels);
+    auto_apply(auto_find(run->table.rows[0].key), run->service->catalogue, &larger);
+    run->probe_pixels = larger.width * larger.height;
+    for (int k = 0; k < PROBES; k++)
+        add_step(run, &larger, CHANNEL_PICTURE);
+}
+
+/* The reference, then every candidate: its error, and its time a few times; then the probes. */
 static void plan_steps(struct run *run, const struct pen_request *asked)
 {
     const struct pen_catalogue *catalogue = run->service->catalogue;
@@ -148,6 +164,8 @@ static void plan_steps(struct run *run, const struct pen_request *asked)
         for (int k = 0; k < REPEATS; k++)
             add_step(run, &timed, CHANNEL_PICTURE);
     }
+    run->probes = run->steps;
+    plan_probes(run, asked);
 }
 
 static int compare_floats(const void *a, const void *b)
@@ -166,23 +184,35 @@ static double screen_ms(const struct pen_result *result)
     return ms;
 }
 
-/* What the shadow inputs cost: the median, because the first one may have compiled programs. */
-static double shadow_ms(const struct compare_row *steps)
+/* The median of one stage over some steps; 0 when none of them went well. */
+static double median_ms(const struct compare_row *steps, int count, enum pen_stage stage)
 {
-    float ms[COLD];
-    int count = 0;
-    for (int k = 0; k < COLD; k++)
+    float ms[STEPS];
+    int good = 0;
+    for (int k = 0; k < count; k++)
         if (steps[k].result.error.code == PEN_OK && steps[k].run_ms > 0)
-            ms[count++] = steps[k].result.stage_ms[PEN_STAGE_SHADOW];
-    qsort(ms, (size_t)count, sizeof *ms, compare_floats);
-    return (double)ms[count / 2];
+            ms[good++] = steps[k].result.stage_ms[stage];
+    qsort(ms, (size_t)good, sizeof *ms, compare_floats);
+    return good ? (double)ms[good / 2] : 0;
+}
+
+/* What of the G-buffer's time at table.pixels does not grow with them. */
+static double geometry_ms(const struct run *run, const struct compare_row *steps)
+{
+    if (run->probes == run->steps)
+        return 0;
+    double small = median_ms(&steps[1 + COLD], REPEATS, PEN_STAGE_GBUFFER);
+    double large = median_ms(&steps[run->probes], PROBES, PEN_STAGE_GBUFFER);
+    double per_pixel = (large - small) / ((double)run->probe_pixels - run->table.pixels);
+    return large > 0 ? fmax(small - fmax(per_pixel, 0) * run->table.pixels, 0) : 0;
 }
 
 /* The row of one candidate from its steps; false when it could not be measured. Of the repeats the
  * second slowest counts, near what nineteen of twenty stay below; the slowest is the one that met a
  * program for the first time. They find their shadow inputs kept, which a request with another
- * light does not: what these cost is added. */
-static bool read_row(const struct compare_row *steps, struct auto_row *row)
+ * light does not: what these cost, the median because the first one may have compiled programs, is
+ * added. `geometry`: geometry_ms. */
+static bool read_row(const struct compare_row *steps, double geometry, struct auto_row *row)
 {
     const struct compare_row *slowest = NULL, *second = NULL;
     if (steps[0].result.error.code != PEN_OK || !(steps[0].run_ms > 0))
@@ -201,20 +231,24 @@ static bool read_row(const struct compare_row *steps, struct auto_row *row)
     if (!typical)
         return false;
     row->rmse = steps[0].result.comparison.rmse;
-    row->screen_ms = fmin(screen_ms(&typical->result), typical->run_ms);
-    double rest_ms = typical->run_ms - row->screen_ms;
-    row->fixed_ms =
-        rest_ms - fmin(typical->result.stage_ms[PEN_STAGE_SHADOW], rest_ms) + shadow_ms(steps);
+    const float *stage_ms = typical->result.stage_ms;
+    double screen = fmin(screen_ms(&typical->result), typical->run_ms);
+    double rest = typical->run_ms - screen;
+    geometry = fmin(geometry, fmin((double)stage_ms[PEN_STAGE_GBUFFER], screen));
+    row->screen_ms = screen - geometry;
+    row->fixed_ms = geometry + rest - fmin((double)stage_ms[PEN_STAGE_SHADOW], rest) +
+                    median_ms(steps, COLD, PEN_STAGE_SHADOW);
     return true;
 }
 
 static void read_rows(struct run *run, const struct compare_row *steps)
 {
     uint32_t candidates = run->table.count;
+    double geometry = geometry_ms(run, steps);
     run->table.count = 0;
     for (uint32_t i = 0; i < candidates; i++) {
         struct auto_row row = run->table.rows[i];
-        if (read_row(&steps[1 + i * STEPS], &row))
+        if (read_row(&steps[1 + i * STEPS], geometry, &row))
             run->table.rows[run->table.count++] = row;
     }
 }
@@ -255,6 +289,8 @@ static bool wants(void *owner, struct compare *compare, uint32_t step)
     const struct compare_row *rows = compare_rows(compare);
     uint32_t repeat = (step - 1) % STEPS, first = step - repeat;
     expire_calls(run);
+    if (step >= run->probes)
+        return true;
     if (repeat && rows[first].result.error.code != PEN_OK)
         return false;
     if (repeat < COLD)

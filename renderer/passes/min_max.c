@@ -8,6 +8,8 @@ static bool build(struct technique_run *run, const struct shadow_key *key,
                                                    : pass_depth_map(run, key->size, error);
     if (!map)
         return false;
+    static const char *const defines[2][2] = {
+        {NULL, "#define FROM_DEPTH\n"}, {"#define EVEN\n", "#define EVEN\n#define FROM_DEPTH\n"}};
     uint32_t side = key->size > 1 ? key->size / 2 : 1;
     struct gl_texture *pyramid = &input->textures[0];
     *pyramid = gl_texture_create(GL_RG32F, side, side, 0, 0);
@@ -20,10 +22,12 @@ static bool build(struct technique_run *run, const struct shadow_key *key,
             UNIT_FREE, level ? pyramid->name : map->textures[0].name, GL_SAMPLE_NEAREST};
         int32_t source_level[4] = {level ? (int32_t)level - 1 : 0};
         uint32_t width = side >> level ? side >> level : 1;
+        uint32_t below = level == 0 ? key->size : side >> (level - 1); /* side of the source */
+        bool even = below > 1 && below % 2 == 0;
         ok = pass_fill(run->ctx,
             &(struct pass_fill){.name = "min-max",
                 .fragment = "min_max.frag",
-                .defines = level ? NULL : "#define FROM_DEPTH\n",
+                .defines = defines[even][level == 0],
                 .stage = PEN_STAGE_SHADOW,
                 .textures = &from,
                 .texture_count = 1,

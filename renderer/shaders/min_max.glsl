@@ -35,7 +35,9 @@ vec2 min_max_window(vec2 q, vec2 extent)
     vec2 size = min_max_size();
     vec2 low = clamp(light_uv(q - extent), 0.0, 1.0), high = clamp(light_uv(q + extent), 0.0, 1.0);
     vec2 span = (high - low) * size;
+    // The last level is a single texel, also where the side is no power of two.
     int level = int(ceil(log2(max(max(span.x, span.y), 1.0))));
+    level = min(level, textureQueryLevels(min_max_pyramid) - 1);
     ivec2 last = max(textureSize(min_max_pyramid, 0).xy >> level, ivec2(1)) - 1;
     vec2 scale = size * exp2(-float(level));
     ivec2 a = clamp(ivec2(low * scale), ivec2(0), last), b = clamp(ivec2(high * scale), ivec2(0), last);

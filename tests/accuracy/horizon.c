@@ -77,8 +77,9 @@ int main(void)
     } cases[] = {{"raytraced&samples=1024", 0.01}, {"multisample&samples=256", 0.02},
         {"accumulation", 0.01}, {"accumulation&layers=2", 0.02}, {"accumulation&mode=paper", 0.01},
         {"backprojection", 0.01}, {"backprojection&fill=join&layers=2", 0.01}, {"bitmask", 0.02},
-        {"bitmask&pattern=regular&layers=2", 0.02}, {"pcss", 0.01}, {"erosion", 0.01},
-        {"bilateral", 0.02}, {"stochastic", 0.02}, {"cascaded", 0.02}, {"adaptive-sampling", 0.02}};
+        {"bitmask&pattern=regular&layers=2", 0.02}, {"pcss", 0.01}, {"vssm", 0.01},
+        {"erosion", 0.01}, {"bilateral", 0.02}, {"stochastic", 0.02}, {"cascaded", 0.02},
+        {"adaptive-sampling", 0.02}};
     /* Shares of 0.7, 0.4 and 0.1: the centre above the top, below it, and almost all below. */
     static const double rises[] = {0.4 * HALF, -0.2 * HALF, -0.8 * HALF};
     uint8_t id[PEN_ID_BYTES];

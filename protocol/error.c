@@ -21,7 +21,7 @@ const char *pen_code_title(enum pen_code code)
     switch (code) {
     case PEN_OK:
         return "OK";
-    case PEN_BAD_REQUEST:
+    case PEN_MALFORMED:
         return "Bad Request";
     case PEN_UNAUTHORIZED:
         return "Unauthorized";
@@ -33,13 +33,13 @@ const char *pen_code_title(enum pen_code code)
         return "Not Acceptable";
     case PEN_TIMEOUT:
         return "Request Timeout";
-    case PEN_TOO_LARGE:
+    case PEN_TOO_BIG:
         return "Content Too Large";
     case PEN_URI_TOO_LONG:
         return "URI Too Long";
-    case PEN_UNSUPPORTED_MEDIA:
+    case PEN_UNKNOWN_TYPE:
         return "Unsupported Media Type";
-    case PEN_UNPROCESSABLE:
+    case PEN_INVALID:
         return "Unprocessable Content";
     case PEN_TOO_MANY:
         return "Too Many Requests";

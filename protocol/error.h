@@ -6,16 +6,16 @@
 /* Each code is the HTTP status it becomes; 4xx is the client's mistake, 5xx the machine's. */
 enum pen_code {
     PEN_OK = 0,
-    PEN_BAD_REQUEST = 400,
+    PEN_MALFORMED = 400,
     PEN_UNAUTHORIZED = 401,
     PEN_NOT_FOUND = 404,
     PEN_METHOD_NOT_ALLOWED = 405,
     PEN_NOT_ACCEPTABLE = 406,
     PEN_TIMEOUT = 408, /* the client was too slow to send its request */
-    PEN_TOO_LARGE = 413,
+    PEN_TOO_BIG = 413,
     PEN_URI_TOO_LONG = 414,
-    PEN_UNSUPPORTED_MEDIA = 415,
-    PEN_UNPROCESSABLE = 422,
+    PEN_UNKNOWN_TYPE = 415,
+    PEN_INVALID = 422,
     PEN_TOO_MANY = 429,
     PEN_INTERNAL = 500,
     PEN_UNAVAILABLE = 503,

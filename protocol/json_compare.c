@@ -35,7 +35,7 @@ static bool read_method(const struct reader *reader, cJSON *root, cJSON *method,
               move_pointer(reader->error, pointer);
     cJSON_DeleteItemFromObjectCaseSensitive(root, "technique");
     if (ok && reader->excluded && !strcmp(request->technique, reader->excluded))
-        return pen_fail(reader->error, PEN_UNPROCESSABLE, pointer,
+        return pen_fail(reader->error, PEN_INVALID, pointer,
             "%s stands for another method: it cannot be compared.", reader->excluded);
     return ok;
 }
@@ -105,7 +105,7 @@ static bool read_list(
 {
     int count = cJSON_GetArraySize(list);
     if (!cJSON_IsArray(list) || count < 1 || count > PEN_COMPARE_METHODS)
-        return pen_fail(reader->error, PEN_UNPROCESSABLE, "/techniques",
+        return pen_fail(reader->error, PEN_INVALID, "/techniques",
             "techniques must be \"all\" or a list of 1 to %d methods.", PEN_COMPARE_METHODS);
     for (cJSON *item = list->child; item; item = item->next) {
         char pointer[32];
@@ -125,11 +125,11 @@ static bool read_root(const struct reader *reader, cJSON *root, struct pen_compa
         {"output", "/output", "A comparison chooses its outputs itself."},
     };
     if (!cJSON_IsObject(root))
-        return pen_fail(reader->error, PEN_UNPROCESSABLE, "", "An object is expected here.");
+        return pen_fail(reader->error, PEN_INVALID, "", "An object is expected here.");
     for (size_t i = 0; i < sizeof refused / sizeof *refused; i++)
         if (cJSON_GetObjectItemCaseSensitive(root, refused[i].key))
             return pen_fail(
-                reader->error, PEN_UNPROCESSABLE, refused[i].pointer, "%s", refused[i].message);
+                reader->error, PEN_INVALID, refused[i].pointer, "%s", refused[i].message);
     cJSON *list = cJSON_DetachItemFromObjectCaseSensitive(root, "techniques");
     cJSON *reference = complete_reference(
         reader, cJSON_DetachItemFromObjectCaseSensitive(root, "reference"), compare);
@@ -140,8 +140,8 @@ static bool read_root(const struct reader *reader, cJSON *root, struct pen_compa
             snprintf(pointer, sizeof pointer, "/%s", twice[i]);
             cJSON_Delete(list);
             cJSON_Delete(reference);
-            return pen_fail(reader->error, PEN_UNPROCESSABLE, pointer,
-                "The key \"%s\" is given twice.", twice[i]);
+            return pen_fail(
+                reader->error, PEN_INVALID, pointer, "The key \"%s\" is given twice.", twice[i]);
         }
     bool all = !list || (cJSON_IsString(list) && !strcmp(list->valuestring, "all"));
     bool ok = read_method(reader, root, reference, "/reference", &compare->requests[0]) &&
@@ -150,8 +150,8 @@ static bool read_root(const struct reader *reader, cJSON *root, struct pen_compa
     cJSON_Delete(reference);
     if (ok &&
         (uint64_t)compare->requests[0].width * compare->requests[0].height > PEN_COMPARE_PIXELS)
-        return pen_fail(reader->error, PEN_UNPROCESSABLE, "/width",
-            "A comparison has at most %u pixels.", PEN_COMPARE_PIXELS);
+        return pen_fail(reader->error, PEN_INVALID, "/width", "A comparison has at most %u pixels.",
+            PEN_COMPARE_PIXELS);
     return ok;
 }
 
@@ -162,12 +162,12 @@ bool pen_compare_from_json(const char *text, size_t bytes, const struct pen_cata
     memset(compare, 0, sizeof *compare);
     if (bytes > PEN_MAX_JSON_BYTES)
         return pen_fail(
-            error, PEN_TOO_LARGE, "", "A request may have at most %d bytes.", PEN_MAX_JSON_BYTES);
+            error, PEN_TOO_BIG, "", "A request may have at most %d bytes.", PEN_MAX_JSON_BYTES);
     if (!pen_json_scan(text, bytes, PEN_MAX_JSON_DEPTH, error))
         return false;
     cJSON *root = cJSON_ParseWithLength(text, bytes);
     bool ok = root ? read_root(&reader, root, compare)
-                   : pen_fail(error, PEN_BAD_REQUEST, "", "Malformed JSON.");
+                   : pen_fail(error, PEN_MALFORMED, "", "Malformed JSON.");
     cJSON_Delete(root);
     return ok;
 }

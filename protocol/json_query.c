@@ -52,7 +52,7 @@ static void expand(const char *key, const struct pen_technique_info *info, char 
 
 static bool refuse_key(struct pen_error *error, const char *key)
 {
-    return pen_fail(error, PEN_UNPROCESSABLE, "", "There is no query key \"%.60s\".", key);
+    return pen_fail(error, PEN_INVALID, "", "There is no query key \"%.60s\".", key);
 }
 
 /* Puts a leaf at `path`, making objects on the way. */
@@ -68,7 +68,7 @@ static bool insert(
             return refuse_key(error, key);
         cJSON *member = cJSON_GetObjectItemCaseSensitive(object, path);
         if (member && (!dot || !cJSON_IsObject(member)))
-            return pen_fail(error, PEN_UNPROCESSABLE, "",
+            return pen_fail(error, PEN_INVALID, "",
                 "The query key \"%.60s\" is given twice, or as a value and a path.", key);
         if (!dot) {
             cJSON_AddStringToObject(object, path, value ? value : "");
@@ -89,7 +89,7 @@ static bool make_array(cJSON *root, struct pen_error *error)
     cJSON *array = cJSON_AddArrayToObject(root, "lights");
     bool ok = cJSON_IsObject(lights) || !strcmp(lights->valuestring, "none");
     if (!ok)
-        pen_fail(error, PEN_UNPROCESSABLE, "/lights",
+        pen_fail(error, PEN_INVALID, "/lights",
             "In a query, lights is \"none\" or lights.0.type and so on.");
     for (int i = 0; ok && lights->child; i++) {
         char index[12];
@@ -99,7 +99,7 @@ static bool make_array(cJSON *root, struct pen_error *error)
             cJSON_AddItemToArray(array, light);
             continue;
         }
-        ok = pen_fail(error, PEN_UNPROCESSABLE, "/lights",
+        ok = pen_fail(error, PEN_INVALID, "/lights",
             "Lights are numbered 0, 1, 2 and so on: \"%.20s\" is given, but not %d.",
             lights->child->string, i);
     }
@@ -111,12 +111,12 @@ bool pen_request_from_query(const struct pen_query_pair *pairs, uint32_t count,
     const struct pen_catalogue *catalogue, struct pen_request *request, struct pen_error *error)
 {
     if (count > MAX_PAIRS)
-        return pen_fail(error, PEN_BAD_REQUEST, "", "A query may have at most %d keys.", MAX_PAIRS);
+        return pen_fail(error, PEN_MALFORMED, "", "A query may have at most %d keys.", MAX_PAIRS);
     for (uint32_t i = 0; i < count; i++) {
         if (strcmp(pairs[i].key, "request"))
             continue;
         if (count > 1)
-            return pen_fail(error, PEN_UNPROCESSABLE, "",
+            return pen_fail(error, PEN_INVALID, "",
                 "The query key \"request\" is a whole request and excludes every other key.");
         const char *text = pairs[i].value ? pairs[i].value : "";
         return pen_request_from_json(text, strlen(text), catalogue, request, error);

@@ -5,6 +5,6 @@
 #include <cjson/cJSON.h>
 
 /* Reads a tree of the shape of a request body. text: leaves are strings in the notation of
- * pen_param_parse. Errors: PEN_UNPROCESSABLE with a pointer. */
+ * pen_param_parse. Errors: PEN_INVALID with a pointer. */
 bool pen_request_from_tree(const cJSON *root, bool text, const struct pen_catalogue *catalogue,
     struct pen_request *request, struct pen_error *error);

@@ -63,8 +63,7 @@ static void pop(struct reader *reader, size_t before)
     reader->pointer[before] = 0;
 }
 
-#define REFUSE(reader, ...)                                                                        \
-    pen_fail((reader)->error, PEN_UNPROCESSABLE, (reader)->pointer, __VA_ARGS__)
+#define REFUSE(reader, ...) pen_fail((reader)->error, PEN_INVALID, (reader)->pointer, __VA_ARGS__)
 
 static bool refuse_choice(
     struct reader *reader, const char *name, const char *const *choices, const char *given)
@@ -410,15 +409,15 @@ bool pen_request_from_json(const char *text, size_t bytes, const struct pen_cata
 {
     if (bytes > PEN_MAX_JSON_BYTES)
         return pen_fail(
-            error, PEN_TOO_LARGE, "", "A request may have at most %d bytes.", PEN_MAX_JSON_BYTES);
+            error, PEN_TOO_BIG, "", "A request may have at most %d bytes.", PEN_MAX_JSON_BYTES);
     if (!bytes)
-        return pen_fail(error, PEN_BAD_REQUEST, "",
+        return pen_fail(error, PEN_MALFORMED, "",
             "The body is empty; an empty object, {}, asks for every default.");
     if (!pen_json_scan(text, bytes, PEN_MAX_JSON_DEPTH, error))
         return false;
     cJSON *root = cJSON_ParseWithLength(text, bytes);
     if (!root)
-        return pen_fail(error, PEN_BAD_REQUEST, "", "Malformed JSON.");
+        return pen_fail(error, PEN_MALFORMED, "", "Malformed JSON.");
     bool ok = pen_request_from_tree(root, false, catalogue, request, error);
     cJSON_Delete(root);
     return ok;

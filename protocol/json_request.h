@@ -6,8 +6,8 @@
 /* Reads a request body: api.md, "A render request". Every default is filled in, every value checked
  * (rows, then pen_request_check). `text` needs no NUL. The scene's id is not part of the body: it
  * is left zero. Two bodies that mean the same give the same bytes in *request. Errors:
- * PEN_TOO_LARGE above PEN_MAX_JSON_BYTES, PEN_BAD_REQUEST for malformed or too deeply nested JSON
- * (byte offset in the message), PEN_UNPROCESSABLE with a pointer for an unknown or repeated key, a
+ * PEN_TOO_BIG above PEN_MAX_JSON_BYTES, PEN_MALFORMED for malformed or too deeply nested JSON
+ * (byte offset in the message), PEN_INVALID with a pointer for an unknown or repeated key, a
  * wrong type, a value out of range, keys that exclude each other. */
 bool pen_request_from_json(const char *text, size_t bytes, const struct pen_catalogue *catalogue,
     struct pen_request *request, struct pen_error *error);

@@ -14,7 +14,7 @@ struct scan {
 static bool fail_at(struct scan *scan, const char *what)
 {
     return pen_fail(
-        scan->error, PEN_BAD_REQUEST, "", "Malformed JSON at byte %zu: %s.", scan->at, what);
+        scan->error, PEN_MALFORMED, "", "Malformed JSON at byte %zu: %s.", scan->at, what);
 }
 
 static int peek(const struct scan *scan)
@@ -218,7 +218,7 @@ bool pen_json_scan(const char *text, size_t bytes, unsigned max_depth, struct pe
         int c = peek(&scan);
         if (c == '{' || c == '[') {
             if (depth == max_depth)
-                return pen_fail(error, PEN_BAD_REQUEST, "",
+                return pen_fail(error, PEN_MALFORMED, "",
                     "The JSON is nested more than %u deep at byte %zu.", max_depth, scan.at);
             closers[depth++] = c == '{' ? '}' : ']';
             scan.at++;

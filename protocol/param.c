@@ -75,19 +75,16 @@ bool pen_param_store(const struct pen_param *row, void *object, const double *va
     for (uint32_t i = 0; i < row->count; i++) {
         double v = values[i];
         if (!isfinite(v))
-            return pen_fail(
-                error, PEN_UNPROCESSABLE, pointer, "%s must be a finite number.", row->name);
+            return pen_fail(error, PEN_INVALID, pointer, "%s must be a finite number.", row->name);
         if (row->type != PEN_PARAM_FLOAT && v != floor(v))
-            return pen_fail(
-                error, PEN_UNPROCESSABLE, pointer, "%s must be a whole number.", row->name);
+            return pen_fail(error, PEN_INVALID, pointer, "%s must be a whole number.", row->name);
         /* Compared as they are stored, so that a value that passes here passes again later. */
         double stored = v, low = min, high = max;
         if (row->type == PEN_PARAM_FLOAT)
             stored = (float)v, low = (float)min, high = (float)max;
         if (stored < low || stored > high || (row->exclusive_min && stored <= low))
-            return pen_fail(error, PEN_UNPROCESSABLE, pointer,
-                "%s is %g, but must lie in %c%g, %g].", row->name, v,
-                row->exclusive_min ? '(' : '[', min, max);
+            return pen_fail(error, PEN_INVALID, pointer, "%s is %g, but must lie in %c%g, %g].",
+                row->name, v, row->exclusive_min ? '(' : '[', min, max);
     }
     for (uint32_t i = 0; i < row->count; i++)
         store(row, object, i, values[i]);
@@ -101,15 +98,14 @@ bool pen_param_parse(const struct pen_param *row, void *object, const char *text
     if (row->choices) {
         int index = pen_choice_index(row->choices, text);
         if (index < 0)
-            return pen_fail(error, PEN_UNPROCESSABLE, pointer, "%s has no choice called \"%.40s\".",
-                row->name, text);
+            return pen_fail(
+                error, PEN_INVALID, pointer, "%s has no choice called \"%.40s\".", row->name, text);
         values[0] = index;
     } else if (row->type == PEN_PARAM_FLAG) {
         if (!strcmp(text, "1") || !strcmp(text, "on") || !strcmp(text, "true"))
             values[0] = 1;
         else if (strcmp(text, "0") && strcmp(text, "off") && strcmp(text, "false"))
-            return pen_fail(
-                error, PEN_UNPROCESSABLE, pointer, "%s must be true or false.", row->name);
+            return pen_fail(error, PEN_INVALID, pointer, "%s must be true or false.", row->name);
     } else {
         const char *at = text;
         for (uint32_t i = 0; i < row->count; i++) {
@@ -120,8 +116,8 @@ bool pen_param_parse(const struct pen_param *row, void *object, const char *text
             /* strtod also takes hexadecimal floats and leading space: neither is a number here. */
             if (end == at || *end != (last ? '\0' : ',') ||
                 strspn(at, "+-.0123456789eE") < (size_t)(end - at))
-                return pen_fail(error, PEN_UNPROCESSABLE, pointer, "%s must be %u number%s.",
-                    row->name, row->count, row->count > 1 ? "s separated by commas" : "");
+                return pen_fail(error, PEN_INVALID, pointer, "%s must be %u number%s.", row->name,
+                    row->count, row->count > 1 ? "s separated by commas" : "");
             at = end + 1;
         }
     }

@@ -68,7 +68,7 @@ void pen_params_default(struct pen_param_table table, void *object);
 const struct pen_param *pen_param_find(struct pen_param_table table, const char *name);
 
 /* Checks and stores one value. `values` holds row->count finite doubles (an enumeration: the index,
- * a flag: 0 or 1). Errors: PEN_UNPROCESSABLE with `pointer`, when a value is NaN, infinite, not
+ * a flag: 0 or 1). Errors: PEN_INVALID with `pointer`, when a value is NaN, infinite, not
  * whole where it must be, or out of range. */
 bool pen_param_store(const struct pen_param *row, void *object, const double *values,
     const char *pointer, struct pen_error *error);

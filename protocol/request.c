@@ -208,12 +208,11 @@ bool pen_request_check(const struct pen_request *request, const struct pen_catal
     struct pen_error *error)
 {
     if (memchr(request->technique, 0, sizeof request->technique) == NULL)
-        return pen_fail(
-            error, PEN_UNPROCESSABLE, "/technique/name", "The method has no valid name.");
+        return pen_fail(error, PEN_INVALID, "/technique/name", "The method has no valid name.");
     const struct pen_technique_info *info = pen_catalogue_find(catalogue, request->technique);
     if (!info)
-        return pen_fail(error, PEN_UNPROCESSABLE, "/technique/name",
-            "There is no method called \"%s\".", request->technique);
+        return pen_fail(error, PEN_INVALID, "/technique/name", "There is no method called \"%s\".",
+            request->technique);
     if (!check_rows(info->params, request->technique_params, 0, "/technique/params", error) ||
         !check_rows(pen_request_table(), request, 0, "", error) ||
         !check_rows(pen_camera_table(), &request->camera, 0, "/camera", error) ||
@@ -221,41 +220,41 @@ bool pen_request_check(const struct pen_request *request, const struct pen_catal
         !check_rows(pen_delivery_table(), &request->delivery, 0, "", error))
         return false;
     if ((uint64_t)request->width * request->height > PEN_MAX_IMAGE_PIXELS)
-        return pen_fail(error, PEN_UNPROCESSABLE, "/width",
+        return pen_fail(error, PEN_INVALID, "/width",
             "%u x %u is more than the %u pixels that one image may have.", request->width,
             request->height, PEN_MAX_IMAGE_PIXELS);
     const struct pen_camera *camera = &request->camera;
     if (camera->mode > PEN_CAMERA_ORBIT)
-        return pen_fail(error, PEN_UNPROCESSABLE, "/camera", "Unknown camera mode.");
+        return pen_fail(error, PEN_INVALID, "/camera", "Unknown camera mode.");
     if (camera->mode == PEN_CAMERA_LOOK_AT &&
         !is_frame(camera->eye, camera->target, camera->up, true))
-        return pen_fail(error, PEN_UNPROCESSABLE, "/camera",
+        return pen_fail(error, PEN_INVALID, "/camera",
             "The camera needs an eye and a target that differ, and an up vector that is not zero.");
     if (request->light_count > PEN_MAX_LIGHTS)
         return pen_fail(
-            error, PEN_UNPROCESSABLE, "/lights", "At most %d lights are allowed.", PEN_MAX_LIGHTS);
+            error, PEN_INVALID, "/lights", "At most %d lights are allowed.", PEN_MAX_LIGHTS);
     for (uint32_t i = 0; i < request->light_count; i++) {
         const struct pen_light *light = &request->lights[i];
         char pointer[32] = "/lights/0";
         pointer[8] = (char)('0' + i);
         if (light->type >= PEN_LIGHT_TYPES)
-            return pen_fail(error, PEN_UNPROCESSABLE, pointer, "Unknown light type.");
+            return pen_fail(error, PEN_INVALID, pointer, "Unknown light type.");
         if (!check_rows(pen_light_table(), light, PEN_LIGHT_BIT(light->type), pointer, error))
             return false;
         bool round = light->type == PEN_LIGHT_POINT || light->type == PEN_LIGHT_SPHERE;
         if (!round && !is_frame(light->position, light->target, light->up, true))
-            return pen_fail(error, PEN_UNPROCESSABLE, pointer,
+            return pen_fail(error, PEN_INVALID, pointer,
                 "The light needs a position and a target that differ, and an up vector.");
         if (light->type == PEN_LIGHT_SPOT && light->inner_cone_deg >= light->outer_cone_deg)
-            return pen_fail(error, PEN_UNPROCESSABLE, pointer,
-                "inner_cone_deg must be smaller than outer_cone_deg.");
+            return pen_fail(
+                error, PEN_INVALID, pointer, "inner_cone_deg must be smaller than outer_cone_deg.");
         if (light->texture > PEN_TEXTURE_PATTERN ||
             (light->texture == PEN_TEXTURE_PATTERN &&
                 light->pattern >= sizeof pen_pattern_names / sizeof *pen_pattern_names - 1))
-            return pen_fail(error, PEN_UNPROCESSABLE, pointer, "Unknown emission pattern.");
+            return pen_fail(error, PEN_INVALID, pointer, "Unknown emission pattern.");
         if (light->texture && light->type != PEN_LIGHT_RECT)
             return pen_fail(
-                error, PEN_UNPROCESSABLE, pointer, "Only rect lights take an emission texture.");
+                error, PEN_INVALID, pointer, "Only rect lights take an emission texture.");
     }
     const struct pen_output *output = &request->output;
     uint32_t bits = output->bit_depth;
@@ -263,11 +262,11 @@ bool pen_request_check(const struct pen_request *request, const struct pen_catal
                     (bits == 16 && output->format != PEN_JPEG && output->format != PEN_WEBP) ||
                     (bits == 32 && output->format == PEN_EXR);
     if (!depth_ok)
-        return pen_fail(error, PEN_UNPROCESSABLE, "/output/bit_depth",
+        return pen_fail(error, PEN_INVALID, "/output/bit_depth",
             "%s cannot have %u bits per channel.", pen_format_names[output->format], bits);
     if (output->layer == PEN_LAYER_ALL && output->format != PEN_EXR)
-        return pen_fail(error, PEN_UNPROCESSABLE, "/output/layer",
-            "All layers in one file need the exr format.");
+        return pen_fail(
+            error, PEN_INVALID, "/output/layer", "All layers in one file need the exr format.");
     return true;
 }
 

@@ -129,7 +129,7 @@ void pen_request_default(struct pen_request *request, const struct pen_catalogue
 void pen_light_default(struct pen_light *light, enum pen_light_type type);
 
 /* Checks what no single row can: pixel budget, layer against format, light against emitter size,
- * degenerate camera, known technique. Errors: PEN_UNPROCESSABLE with a pointer. A worker calls it
+ * degenerate camera, known technique. Errors: PEN_INVALID with a pointer. A worker calls it
  * too: it trusts no message. */
 struct pen_technique_info;
 bool pen_request_check(const struct pen_request *request, const struct pen_catalogue *catalogue,

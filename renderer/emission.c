@@ -216,7 +216,7 @@ const struct emission *emission_cache_get(struct emission_cache *cache,
     }
     uint32_t frames = pattern ? emission_pattern_frames(light->pattern) : image->blob.image_count;
     if (!frames) {
-        pen_fail(error, PEN_UNPROCESSABLE, "/lights", "The emission image holds no picture.");
+        pen_fail(error, PEN_INVALID, "/lights", "The emission image holds no picture.");
         return NULL;
     }
     struct key key;

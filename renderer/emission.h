@@ -23,7 +23,7 @@ void emission_cache_destroy(struct emission_cache *cache);
 /* What `light` emits at `time_s`, made on first use; NULL without an error when it has no texture.
  * `image`: the resident scene that holds the image of a PEN_TEXTURE_IMAGE light, else NULL; several
  * images in it are frames at 24 per second. Valid until the next emission_cache_trim.
- * Errors: PEN_UNPROCESSABLE when the scene holds no image, PEN_INTERNAL when it is not resident. */
+ * Errors: PEN_INVALID when the scene holds no image, PEN_INTERNAL when it is not resident. */
 const struct emission *emission_cache_get(struct emission_cache *cache,
     const struct pen_light *light, const struct scene *image, float time_s,
     struct pen_error *error);

@@ -184,7 +184,7 @@ static bool load(struct pen_renderer *r, const uint8_t id[PEN_ID_BYTES], struct 
         return false;
     (void)id;
     if (scene->bytes > r->budget) {
-        pen_fail(error, PEN_TOO_LARGE, "",
+        pen_fail(error, PEN_TOO_BIG, "",
             "The scene needs %.0f MiB of GPU memory; %.0f MiB are allowed.",
             (double)scene->bytes / (1 << 20), (double)r->budget / (1 << 20));
         scene_destroy(scene);

@@ -33,7 +33,7 @@ void pen_renderer_destroy(struct pen_renderer *renderer);
 const struct pen_device_info *pen_renderer_device(const struct pen_renderer *renderer);
 
 /* Makes a scene resident from its blob; a no-op when it is. May evict others (LRU) to stay in the
- * budget. Errors: PEN_UNPROCESSABLE for a bad blob, PEN_TOO_LARGE when it can never fit. */
+ * budget. Errors: PEN_INVALID for a bad blob, PEN_TOO_BIG when it can never fit. */
 bool pen_renderer_load_scene(struct pen_renderer *renderer, const uint8_t id[PEN_ID_BYTES],
     int blob_fd, struct pen_error *error);
 bool pen_renderer_has_scene(const struct pen_renderer *renderer, const uint8_t id[PEN_ID_BYTES]);
@@ -64,7 +64,7 @@ struct pen_frame {
 void pen_frame_finish(struct pen_frame *frame);
 
 /* Renders one checked request whose scene and images are resident. Fills the times, the completed
- * request and the warnings of *result (not queue, load and encode). PEN_UNPROCESSABLE: the request
+ * request and the warnings of *result (not queue, load and encode). PEN_INVALID: the request
  * asks what this scene does not have (camera 7 of 3). PEN_INTERNAL with a lost context: destroy. */
 bool pen_renderer_render(struct pen_renderer *renderer, const struct pen_request *request,
     struct pen_frame *frame, struct pen_result *result, struct pen_error *error);

@@ -66,7 +66,7 @@ bool view_resolve(struct view *v, struct pen_camera *c, const struct scene *scen
     v->aspect = (float)width / (float)height;
     if (c->mode == PEN_CAMERA_INDEX) {
         if (c->index >= scene->blob.camera_count)
-            return pen_fail(error, PEN_UNPROCESSABLE, "/camera/index",
+            return pen_fail(error, PEN_INVALID, "/camera/index",
                 "The scene has %u cameras; there is no number %u.", scene->blob.camera_count,
                 c->index);
         const struct psc_camera *from = &scene->blob.cameras[c->index];

@@ -12,7 +12,7 @@ struct view {
 };
 
 /* Resolves the camera (auto, index and orbit become look-at in *camera) and fills *view. Errors:
- * PEN_UNPROCESSABLE when the scene has no such camera. */
+ * PEN_INVALID when the scene has no such camera. */
 bool view_resolve(struct view *view, struct pen_camera *camera, const struct scene *scene,
     uint32_t width, uint32_t height, struct pen_error *error);
 

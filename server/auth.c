@@ -39,8 +39,7 @@ struct auth *auth_load(const char *path, struct pen_error *error)
             continue;
         const char *token = second ? second : first;
         if (strlen(token) < MIN_TOKEN) {
-            pen_fail(
-                error, PEN_UNPROCESSABLE, "", "A token has fewer than %d characters.", MIN_TOKEN);
+            pen_fail(error, PEN_INVALID, "", "A token has fewer than %d characters.", MIN_TOKEN);
             goto fail;
         }
         auth->digests = realloc(auth->digests, (auth->count + 1) * sizeof *auth->digests);
@@ -49,7 +48,7 @@ struct auth *auth_load(const char *path, struct pen_error *error)
         digest_of(token, auth->digests[auth->count++]);
     }
     if (!auth->count) {
-        pen_fail(error, PEN_UNPROCESSABLE, "", "The token file holds no token.");
+        pen_fail(error, PEN_INVALID, "", "The token file holds no token.");
         goto fail;
     }
     fclose(file);

@@ -4,7 +4,7 @@
 #include <stdint.h>
 
 struct auth;
-/* Errors: PEN_UNAVAILABLE (unreadable), PEN_UNPROCESSABLE (no token, a token under 16 characters).
+/* Errors: PEN_UNAVAILABLE (unreadable), PEN_INVALID (no token, a token under 16 characters).
  */
 struct auth *auth_load(const char *path, struct pen_error *error);
 void auth_destroy(struct auth *auth); /* NULL is fine */

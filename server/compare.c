@@ -40,7 +40,7 @@ static bool submit(struct compare *c, uint32_t *retry_after_s, struct pen_error 
 static bool ends_all(const struct compare *c, const struct pen_error *error)
 {
     return error->code != PEN_OK &&
-           (!c->at || (error->code != PEN_UNPROCESSABLE && error->code != PEN_INTERNAL));
+           (!c->at || (error->code != PEN_INVALID && error->code != PEN_INTERNAL));
 }
 
 static void take(struct compare *c, const struct outcome *outcome)

@@ -126,13 +126,13 @@ static bool store(const struct row *row, struct config *config, const char *text
     switch (row->kind) {
     case KIND_TEXT:
         if (strlen(text) >= CONFIG_TEXT_BYTES)
-            return pen_fail(error, PEN_UNPROCESSABLE, "", "%s is too long.", source);
+            return pen_fail(error, PEN_INVALID, "", "%s is too long.", source);
         strcpy(at, text);
         return true;
     case KIND_NUMBER:
     case KIND_SIZE:
         if (!parse_number(row, text, &number) || number < row->min || number > row->max)
-            return pen_fail(error, PEN_UNPROCESSABLE, "",
+            return pen_fail(error, PEN_INVALID, "",
                 "%s must be a whole number from %llu to %llu%s, not \"%.40s\".", source,
                 (unsigned long long)row->min, (unsigned long long)row->max,
                 row->kind == KIND_SIZE ? ", with K, M or G if you like" : "", text);
@@ -147,13 +147,12 @@ static bool store(const struct row *row, struct config *config, const char *text
         else if (!strcmp(text, "0") || !strcmp(text, "off") || !strcmp(text, "false"))
             ((config_flag *)at)->on = false;
         else
-            return pen_fail(error, PEN_UNPROCESSABLE, "", "%s must be on or off.", source);
+            return pen_fail(error, PEN_INVALID, "", "%s must be on or off.", source);
         return true;
     default:
         index = pen_choice_index(row->choices, text);
         if (index < 0)
-            return pen_fail(
-                error, PEN_UNPROCESSABLE, "", "%s has no choice \"%.40s\".", source, text);
+            return pen_fail(error, PEN_INVALID, "", "%s has no choice \"%.40s\".", source, text);
         ((config_choice *)at)->index = (uint32_t)index;
         return true;
     }
@@ -189,7 +188,7 @@ bool config_read(struct config *config, int argc, char **argv, struct pen_error 
         const struct row *row = find_flag(argv[i], &value);
         if (!row)
             return pen_fail(
-                error, PEN_UNPROCESSABLE, "", "There is no setting %.60s; see --help.", argv[i]);
+                error, PEN_INVALID, "", "There is no setting %.60s; see --help.", argv[i]);
         char name[64];
         flag_name(row, name);
         if (!value && row->kind == KIND_FLAG)
@@ -197,12 +196,12 @@ bool config_read(struct config *config, int argc, char **argv, struct pen_error 
         else if (!value && ++i < argc)
             value = argv[i];
         if (!value)
-            return pen_fail(error, PEN_UNPROCESSABLE, "", "%s needs a value.", name);
+            return pen_fail(error, PEN_INVALID, "", "%s needs a value.", name);
         if (!store(row, config, value, name, error))
             return false;
     }
     if (!*config->tls_cert != !*config->tls_key)
-        return pen_fail(error, PEN_UNPROCESSABLE, "", "--tls-cert and --tls-key go together.");
+        return pen_fail(error, PEN_INVALID, "", "--tls-cert and --tls-key go together.");
     return true;
 }
 

@@ -42,7 +42,7 @@ struct config {
     config_choice log_format; /* enum config_log_format */
 };
 
-/* Defaults, then the environment, then the command line. Errors: PEN_UNPROCESSABLE, for an unknown
+/* Defaults, then the environment, then the command line. Errors: PEN_INVALID, for an unknown
  * flag, a value out of range or settings that contradict each other. */
 bool config_read(struct config *config, int argc, char **argv, struct pen_error *error);
 /* True when --help or --version stands on the command line; it has then been answered. */

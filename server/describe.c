@@ -84,7 +84,7 @@ char *describe_blob(enum store_kind kind, const uint8_t id[PEN_ID_BYTES], int bl
     } else if (kind == STORE_SCENES) {
         text = describe_scene(&scene, id, source_bytes);
     } else if (scene.image_count != 1) {
-        pen_fail(error, PEN_UNPROCESSABLE, "", "The upload holds no image.");
+        pen_fail(error, PEN_INVALID, "", "The upload holds no image.");
     } else {
         struct pen_image_info info = {.source_bytes = source_bytes,
             .blob_bytes = scene.header->file_bytes,

@@ -2,7 +2,7 @@
 #pragma once
 #include "server/scene_store.h"
 
-/* The document (pen_scene_json or pen_image_json), malloc'd. Errors: PEN_UNPROCESSABLE for a blob
+/* The document (pen_scene_json or pen_image_json), malloc'd. Errors: PEN_INVALID for a blob
  * that does not pass psc_open, or that is of another source. */
 char *describe_blob(enum store_kind kind, const uint8_t id[PEN_ID_BYTES], int blob_fd,
     uint64_t source_bytes, struct pen_error *error);

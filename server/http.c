@@ -104,7 +104,7 @@ static bool check_framing(struct http_exchange *x, const char *version, struct p
         f.fault = "This method has no body.";
     x->content_length = f.chunked ? HTTP_UNKNOWN_LENGTH : f.length;
     if (f.fault)
-        return pen_fail(error, PEN_BAD_REQUEST, "", "%s", f.fault);
+        return pen_fail(error, PEN_MALFORMED, "", "%s", f.fault);
     return true;
 }
 
@@ -113,7 +113,7 @@ static bool check_target(struct http_exchange *x, struct pen_error *error)
 {
     for (const char *c = x->path; *c; c++)
         if (*c <= 0x20 || *c >= 0x7f || *c == '#')
-            return pen_fail(error, PEN_BAD_REQUEST, "", "The request target is malformed.");
+            return pen_fail(error, PEN_MALFORMED, "", "The request target is malformed.");
     if (strlen(x->path) > HTTP_MAX_TARGET)
         return pen_fail(error, PEN_URI_TOO_LONG, "", "The request target is too long.");
     for (const char *scheme = "http://"; scheme; scheme = scheme[4] == ':' ? "https://" : NULL) {
@@ -125,7 +125,7 @@ static bool check_target(struct http_exchange *x, struct pen_error *error)
         }
     }
     if (*x->path != '/')
-        return pen_fail(error, PEN_BAD_REQUEST, "", "The request target is not a path.");
+        return pen_fail(error, PEN_MALFORMED, "", "The request target is not a path.");
     char *mark = strchr(x->path, '?');
     if (mark) {
         *mark = 0;

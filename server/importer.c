@@ -66,7 +66,7 @@ static bool judge(struct importer *importer, int status, const struct pen_error 
     }
     if (WIFEXITED(status) && (WEXITSTATUS(status) == 126 || WEXITSTATUS(status) == 127))
         return pen_fail(error, PEN_INTERNAL, "", "The importer could not be run.");
-    return pen_fail(error, PEN_UNPROCESSABLE, "",
+    return pen_fail(error, PEN_INVALID, "",
         "The file could not be read: its import crashed or went over its limits.");
 }
 
@@ -100,7 +100,7 @@ static bool run_process(struct importer *importer, const struct import_task *tas
             process_signal(&process, SIGKILL);
             process_wait(&process, -1, &status);
             count(importer, &importer->numbers.timed_out);
-            ok = late ? pen_fail(error, PEN_UNPROCESSABLE, "", "The import took too long.")
+            ok = late ? pen_fail(error, PEN_INVALID, "", "The import took too long.")
                       : pen_fail(error, PEN_UNAVAILABLE, "", "The service is shutting down.");
             break;
         }
@@ -156,7 +156,7 @@ static void add_upload(struct importer *importer, struct import_task *task)
     if (task->expects_id && memcmp(id, task->id, PEN_ID_BYTES)) {
         char hex[PEN_ID_HEX + 1];
         pen_id_to_hex(id, hex);
-        pen_fail(&task->error, PEN_UNPROCESSABLE, "",
+        pen_fail(&task->error, PEN_INVALID, "",
             "The SHA-256 of the upload is %s, not what the address says.", hex);
         return;
     }

@@ -8,7 +8,7 @@ struct import_task {
     struct upload *upload; /* the task's until `finish`; NULL: import a stale blob again */
     enum store_kind kind;
     uint8_t id[PEN_ID_BYTES]; /* filled in; PUT: see expects_id */
-    bool expects_id;          /* the upload must hash to `id`, else PEN_UNPROCESSABLE */
+    bool expects_id;          /* the upload must hash to `id`, else PEN_INVALID */
     bool added;               /* false: it was there already */
     struct pen_error error;
     double ms;

@@ -73,7 +73,7 @@ struct multipart *multipart_create(
     if (!m)
         abort();
     if (!find_parameter(content_type, "boundary", boundary, sizeof boundary) || !*boundary) {
-        pen_fail(error, PEN_UNSUPPORTED_MEDIA, "", "multipart/form-data needs a boundary.");
+        pen_fail(error, PEN_UNKNOWN_TYPE, "", "multipart/form-data needs a boundary.");
         free(m);
         return NULL;
     }
@@ -105,20 +105,19 @@ static bool read_headers(struct multipart *m, char *block, struct pen_error *err
             *end = 0;
         if (!strncasecmp(line, "Content-Disposition:", 20)) {
             if (strlen(line + 20) >= sizeof disposition)
-                return pen_fail(error, PEN_BAD_REQUEST, "", "A part's header is too long.");
+                return pen_fail(error, PEN_MALFORMED, "", "A part's header is too long.");
             strcpy(disposition, line + 20);
         } else if (!strncasecmp(line, "Content-Transfer-Encoding:", 26)) {
             const char *value = line + 26 + strspn(line + 26, " ");
             if (strcasecmp(value, "binary") && strcasecmp(value, "8bit") &&
                 strcasecmp(value, "7bit"))
-                return pen_fail(
-                    error, PEN_BAD_REQUEST, "", "Parts cannot have a transfer encoding.");
+                return pen_fail(error, PEN_MALFORMED, "", "Parts cannot have a transfer encoding.");
         }
         line = end ? end + 2 : NULL;
     }
     const char *type = disposition + strspn(disposition, " \t");
     if (strncasecmp(type, "form-data", 9))
-        return pen_fail(error, PEN_BAD_REQUEST, "", "A part has no form-data disposition.");
+        return pen_fail(error, PEN_MALFORMED, "", "A part has no form-data disposition.");
     m->wanted = find_parameter(type, "filename", name, sizeof name) && *name;
     return !m->wanted || m->sink.begin(m->sink.context, name, error);
 }
@@ -136,13 +135,13 @@ static bool step(struct multipart *m, bool *progress, struct pen_error *error)
         char *end = memmem(m->buffer, m->used, "\r\n\r\n", 4);
         if (!end) {
             if (m->used > MAX_PART_HEADER)
-                return pen_fail(error, PEN_BAD_REQUEST, "", "A part's header is too long.");
+                return pen_fail(error, PEN_MALFORMED, "", "A part's header is too long.");
             return true;
         }
         if (memchr(m->buffer, 0, (size_t)(end - m->buffer)))
-            return pen_fail(error, PEN_BAD_REQUEST, "", "A part's header is malformed.");
+            return pen_fail(error, PEN_MALFORMED, "", "A part's header is malformed.");
         if (end == m->buffer || ++m->parts > MAX_PARTS)
-            return pen_fail(error, PEN_BAD_REQUEST, "",
+            return pen_fail(error, PEN_MALFORMED, "",
                 end == m->buffer ? "A part has no header." : "There are too many parts.");
         *end = 0;
         size_t bytes = (size_t)(end - m->buffer) + 4;
@@ -179,7 +178,7 @@ static bool step(struct multipart *m, bool *progress, struct pen_error *error)
     if (m->used < at + 2 && at - m->mark_bytes < 256)
         return true;
     if (m->used < at + 2 || memcmp(m->buffer + at, "\r\n", 2))
-        return pen_fail(error, PEN_BAD_REQUEST, "", "A boundary is malformed.");
+        return pen_fail(error, PEN_MALFORMED, "", "A boundary is malformed.");
     consume(m, at);
     m->where = HEADERS;
     *progress = true;
@@ -207,5 +206,5 @@ bool multipart_end(const struct multipart *m, struct pen_error *error)
 {
     if (m->where == EPILOGUE)
         return true;
-    return pen_fail(error, PEN_BAD_REQUEST, "", "The upload ends before its closing boundary.");
+    return pen_fail(error, PEN_MALFORMED, "", "The upload ends before its closing boundary.");
 }

@@ -11,12 +11,12 @@ struct multipart_sink {
     void *context;
 };
 
-/* From a Content-Type header. NULL with PEN_UNSUPPORTED_MEDIA when there is no usable boundary. */
+/* From a Content-Type header. NULL with PEN_UNKNOWN_TYPE when there is no usable boundary. */
 struct multipart *multipart_create(
     const char *content_type, const struct multipart_sink *sink, struct pen_error *error);
 void multipart_destroy(struct multipart *multipart); /* NULL is fine */
-/* Errors: PEN_BAD_REQUEST, or the sink's. */
+/* Errors: PEN_MALFORMED, or the sink's. */
 bool multipart_add(
     struct multipart *multipart, const void *data, size_t bytes, struct pen_error *error);
-/* The body is over. Errors: PEN_BAD_REQUEST when the closing boundary has not come. */
+/* The body is over. Errors: PEN_MALFORMED when the closing boundary has not come. */
 bool multipart_end(const struct multipart *multipart, struct pen_error *error);

@@ -135,10 +135,9 @@ bool routes_split_query(
         if (value)
             *value++ = 0;
         if (*count == ROUTES_MAX_PAIRS)
-            return pen_fail(error, PEN_BAD_REQUEST, "", "The query has too many keys.");
+            return pen_fail(error, PEN_MALFORMED, "", "The query has too many keys.");
         if (!decode(at) || (value && !decode(value)))
-            return pen_fail(
-                error, PEN_BAD_REQUEST, "", "The query has an invalid percent-encoding.");
+            return pen_fail(error, PEN_MALFORMED, "", "The query has an invalid percent-encoding.");
         pairs[(*count)++] = (struct pen_query_pair){at, value};
     }
     return true;
@@ -238,10 +237,10 @@ static bool check_body(struct call *call, struct pen_error *error)
                             (length > 17 && !strncasecmp(type, "application/", 12) &&
                                 !strncasecmp(type + length - 5, "+json", 5)));
     if (type && !json)
-        return pen_fail(error, PEN_UNSUPPORTED_MEDIA, "", "A render request is application/json.");
+        return pen_fail(error, PEN_UNKNOWN_TYPE, "", "A render request is application/json.");
     if (x->content_length != HTTP_UNKNOWN_LENGTH && x->content_length > PEN_MAX_JSON_BYTES)
         return pen_fail(
-            error, PEN_TOO_LARGE, "", "A render request has at most %d bytes.", PEN_MAX_JSON_BYTES);
+            error, PEN_TOO_BIG, "", "A render request has at most %d bytes.", PEN_MAX_JSON_BYTES);
     return true;
 }
 
@@ -283,8 +282,8 @@ static void body(struct http_exchange *x, const void *data, size_t bytes)
         return;
     }
     if (call->text_bytes + bytes > PEN_MAX_JSON_BYTES) {
-        pen_fail(&error, PEN_TOO_LARGE, "", "A render request has at most %d bytes.",
-            PEN_MAX_JSON_BYTES);
+        pen_fail(
+            &error, PEN_TOO_BIG, "", "A render request has at most %d bytes.", PEN_MAX_JSON_BYTES);
         routes_fail(call, &error, 0);
         return;
     }

@@ -76,7 +76,7 @@ static bool read_body(struct call *call, struct pen_error *error)
     const char *text = call->text_bytes ? call->text : "{}";
     if (call->exchange->query && *call->exchange->query)
         return pen_fail(
-            error, PEN_BAD_REQUEST, "", "A comparison is all in its body: there can be no query.");
+            error, PEN_MALFORMED, "", "A comparison is all in its body: there can be no query.");
     call->compare = malloc(sizeof *call->compare);
     if (!call->compare)
         abort();

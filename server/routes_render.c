@@ -92,7 +92,7 @@ static bool read_request(struct call *call, struct pen_error *error)
     const struct pen_catalogue *catalogue = call->service->catalogue;
     if (call->route == PEN_ROUTE_RENDER_POST) {
         if (call->exchange->query && *call->exchange->query)
-            return pen_fail(error, PEN_BAD_REQUEST, "",
+            return pen_fail(error, PEN_MALFORMED, "",
                 "A posted render request is all in its body: there can be no query.");
         const char *text = call->text_bytes ? call->text : "{}";
         return pen_request_from_json(
@@ -140,11 +140,11 @@ bool routes_check_store(struct call *call, uint32_t *retry_after_s, struct pen_e
         snprintf(pointer, sizeof pointer, "/lights/%u/texture/image", i);
         if (light->texture == PEN_TEXTURE_IMAGE &&
             !scene_store_find(s->store, STORE_IMAGES, light->image, NULL))
-            return pen_fail(error, PEN_UNPROCESSABLE, pointer, "There is no such image.");
+            return pen_fail(error, PEN_INVALID, pointer, "There is no such image.");
     }
     *retry_after_s = worker_pool_quarantine_s(s->pool, call->id);
     if (*retry_after_s)
-        return pen_fail(error, PEN_UNPROCESSABLE, "",
+        return pen_fail(error, PEN_INVALID, "",
             "Rendering this scene ended the renderer twice: it is refused for %u more seconds.",
             *retry_after_s);
     return true;

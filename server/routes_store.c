@@ -51,13 +51,13 @@ bool routes_begin_upload(struct call *call)
     if (service_is_draining(s))
         pen_fail(&error, PEN_UNAVAILABLE, "", "The service is shutting down.");
     else if (!type || !takes_type(kind_of(call), type))
-        pen_fail(&error, PEN_UNSUPPORTED_MEDIA, "",
+        pen_fail(&error, PEN_UNKNOWN_TYPE, "",
             kind_of(call) == STORE_SCENES
                 ? "A scene is model/gltf-binary, model/gltf+json, application/zip or "
                   "multipart/form-data."
                 : "An image is image/png, image/jpeg or image/webp.");
     else if (x->content_length != HTTP_UNKNOWN_LENGTH && x->content_length > limit)
-        pen_fail(&error, PEN_TOO_LARGE, "", "An upload has at most %llu bytes.",
+        pen_fail(&error, PEN_TOO_BIG, "", "An upload has at most %llu bytes.",
             (unsigned long long)limit);
     if (error.code == PEN_OK) {
         call->counts_as_upload = true;
@@ -132,15 +132,14 @@ static bool read_page(struct call *call, uint32_t *limit, uint8_t after[PEN_ID_B
             char *end;
             unsigned long n = strtoul(value, &end, 10);
             if (*value < '0' || *value > '9' || *end || n < 1 || n > MAX_PAGE)
-                return pen_fail(error, PEN_UNPROCESSABLE, "/limit",
+                return pen_fail(error, PEN_INVALID, "/limit",
                     "limit must be a whole number from 1 to %d.", MAX_PAGE);
             *limit = (uint32_t)n;
         } else if (!strcmp(pairs[i].key, "after")) {
             if (!(*has_after = pen_id_from_hex(value, after)))
-                return pen_fail(error, PEN_UNPROCESSABLE, "/after", "after must be an id.");
+                return pen_fail(error, PEN_INVALID, "/after", "after must be an id.");
         } else {
-            return pen_fail(
-                error, PEN_UNPROCESSABLE, "", "A list takes only the keys limit and after.");
+            return pen_fail(error, PEN_INVALID, "", "A list takes only the keys limit and after.");
         }
     }
     return true;

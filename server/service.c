@@ -296,7 +296,7 @@ struct service *service_create(
         setrlimit(RLIMIT_NOFILE, &files);
     }
     if (!is_loopback(config->listen) && !*config->token_file && !config->insecure.on) {
-        pen_fail(error, PEN_UNPROCESSABLE, "",
+        pen_fail(error, PEN_INVALID, "",
             "Beyond loopback --token-file is needed, or --insecure if that is meant.");
         goto fail;
     }

@@ -68,10 +68,10 @@ static bool begin_part(void *context, const char *name, struct pen_error *error)
     while (!strncmp(name, "./", 2))
         name += 2;
     if (!is_safe_name(name))
-        return pen_fail(error, PEN_UNPROCESSABLE, "", "A file of the upload has an invalid name.");
+        return pen_fail(error, PEN_INVALID, "", "A file of the upload has an invalid name.");
     if (u->part_count == PEN_BUNDLE_MAX_ENTRIES)
         return pen_fail(
-            error, PEN_TOO_LARGE, "", "An upload has at most %d files.", PEN_BUNDLE_MAX_ENTRIES);
+            error, PEN_TOO_BIG, "", "An upload has at most %d files.", PEN_BUNDLE_MAX_ENTRIES);
     if (u->part_count == u->part_capacity) {
         u->part_capacity = u->part_capacity * 2 + 16;
         u->parts = realloc(u->parts, u->part_capacity * sizeof *u->parts);
@@ -139,7 +139,7 @@ bool upload_add(struct upload *u, const void *data, size_t bytes, struct pen_err
 {
     u->bytes += bytes;
     if (u->bytes > u->limit)
-        return pen_fail(error, PEN_TOO_LARGE, "", "An upload has at most %llu bytes.",
+        return pen_fail(error, PEN_TOO_BIG, "", "An upload has at most %llu bytes.",
             (unsigned long long)u->limit);
     if (u->multipart)
         return multipart_add(u->multipart, data, bytes, error);
@@ -186,12 +186,11 @@ static bool stands_alone(const char *name)
 static bool write_bundle(struct upload *u, struct pen_error *error)
 {
     if (!u->part_count)
-        return pen_fail(error, PEN_BAD_REQUEST, "", "The upload holds no file.");
+        return pen_fail(error, PEN_MALFORMED, "", "The upload holds no file.");
     qsort(u->parts, u->part_count, sizeof *u->parts, by_name);
     for (uint32_t i = 1; i < u->part_count; i++)
         if (!strcmp(u->parts[i - 1].name, u->parts[i].name))
-            return pen_fail(
-                error, PEN_UNPROCESSABLE, "", "Two files of the upload have the same name.");
+            return pen_fail(error, PEN_INVALID, "", "Two files of the upload have the same name.");
     int to = openat(u->staging.folder, STORE_SOURCE, O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
     if (to < 0)
         return pen_fail(error, PEN_UNAVAILABLE, "", "The store could not be written.");
@@ -219,7 +218,7 @@ bool upload_finish(struct upload *u, uint8_t id[PEN_ID_BYTES], struct pen_error 
     if (u->multipart && (!multipart_end(u->multipart, error) || !write_bundle(u, error)))
         return false;
     if (!u->bytes)
-        return pen_fail(error, PEN_BAD_REQUEST, "", "The upload is empty.");
+        return pen_fail(error, PEN_MALFORMED, "", "The upload is empty.");
     hash_finish(u->hash, id);
     u->hash = NULL;
     close(u->file);

@@ -77,7 +77,7 @@ static bool load(struct worker *worker, const struct channel_job *job,
     for (uint32_t i = 0; all && i < job->image_count; i++)
         all = pen_renderer_has_image(renderer, job->images[i]);
     if (ok && !all)
-        pen_fail(error, PEN_TOO_LARGE, "",
+        pen_fail(error, PEN_TOO_BIG, "",
             "The scene and its emission images do not fit into GPU memory together.");
     return all;
 }

@@ -158,7 +158,7 @@ bool psc_builder_add_mesh(struct psc_builder *builder, const struct psc_mesh *me
     if (first_vertex + g.vertex_count > UINT32_MAX ||
         first_index + g.index_count > PSC_MAX_INDICES) {
         psc_geometry_finish(&g);
-        return pen_fail(error, PEN_UNPROCESSABLE, "", "The scene has more than 2^31 indices.");
+        return pen_fail(error, PEN_INVALID, "", "The scene has more than 2^31 indices.");
     }
     struct psc_primitive p = {.first_index = (uint32_t)first_index,
         .index_count = g.index_count,
@@ -270,8 +270,8 @@ bool psc_builder_finish(struct psc_builder *builder, const uint8_t source[PEN_ID
         psc_builder_add_material(builder, &material);
     }
     if (builder->lost_instances)
-        return pen_fail(error, PEN_UNPROCESSABLE, "",
-            "%u instances have a transform that is not finite.", builder->lost_instances);
+        return pen_fail(error, PEN_INVALID, "", "%u instances have a transform that is not finite.",
+            builder->lost_instances);
     struct psc_header header = {.magic = PSC_MAGIC,
         .version = PSC_VERSION,
         .header_bytes = sizeof header,
@@ -279,7 +279,7 @@ bool psc_builder_finish(struct psc_builder *builder, const uint8_t source[PEN_ID
     memcpy(header.source, source, sizeof header.source);
     world_bounds(builder, &header);
     if (!all_finite(header.bounds_min, 6))
-        return pen_fail(error, PEN_UNPROCESSABLE, "", "The scene's bounds are not finite.");
+        return pen_fail(error, PEN_INVALID, "", "The scene's bounds are not finite.");
 
     uint64_t end = sizeof header;
     for (int i = 0; i < PSC_SECTIONS; i++) {

@@ -40,7 +40,7 @@ void psc_builder_add_warning(struct psc_builder *builder, const char *format, ..
 void psc_builder_set_animations(struct psc_builder *builder, uint32_t count);
 
 /* Adds triangles. Degenerate ones are kept; an index out of range, a non-finite position or more
- * than 2^31 indices in total fails with PEN_UNPROCESSABLE. */
+ * than 2^31 indices in total fails with PEN_INVALID. */
 bool psc_builder_add_mesh(struct psc_builder *builder, const struct psc_mesh *mesh,
     uint32_t *primitive, struct pen_error *error);
 /* world: row-major 3x4. */

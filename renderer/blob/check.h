@@ -8,8 +8,7 @@
 #define PSC_MAX_SIDE 16384u /* px; what GL 4.5 software and hardware both take */
 #define PSC_MAX_INDICES (1u << 31)
 
-#define DAMAGED(error, ...)                                                                        \
-    pen_fail(error, PEN_UNPROCESSABLE, "", "Damaged scene file: " __VA_ARGS__)
+#define DAMAGED(error, ...) pen_fail(error, PEN_INVALID, "", "Damaged scene file: " __VA_ARGS__)
 
 /* True when `count` floats are neither infinite nor NaN; integer tests, so that it vectorises. */
 static inline bool all_finite(const void *floats, size_t count)

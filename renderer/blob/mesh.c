@@ -34,28 +34,28 @@ bool psc_triangle_normal(const float a[3], const float b[3], const float c[3], d
 static bool check_mesh(const struct psc_mesh *mesh, struct pen_error *error)
 {
     if (mesh->index_count % 3)
-        return pen_fail(error, PEN_UNPROCESSABLE, "", "A mesh has %u indices, not a multiple of 3.",
+        return pen_fail(error, PEN_INVALID, "", "A mesh has %u indices, not a multiple of 3.",
             mesh->index_count);
     if (!mesh->indices && mesh->index_count > mesh->vertex_count)
-        return pen_fail(error, PEN_UNPROCESSABLE, "", "A mesh has fewer vertices than corners.");
+        return pen_fail(error, PEN_INVALID, "", "A mesh has fewer vertices than corners.");
     for (uint32_t i = 0; mesh->indices && i < mesh->index_count; i++)
         if (mesh->indices[i] >= mesh->vertex_count)
-            return pen_fail(error, PEN_UNPROCESSABLE, "", "Index %u of a mesh of %u vertices.",
+            return pen_fail(error, PEN_INVALID, "", "Index %u of a mesh of %u vertices.",
                 mesh->indices[i], mesh->vertex_count);
     for (uint32_t i = 0; i < mesh->vertex_count; i++)
         for (int k = 0; k < 3; k++)
             if (!(fabsf(mesh->positions[i][k]) <= FARTHEST))
-                return pen_fail(error, PEN_UNPROCESSABLE, "",
+                return pen_fail(error, PEN_INVALID, "",
                     "A vertex position is not finite or is farther than 1e12 m from the origin.");
     uint64_t triangles = 0;
     for (uint32_t i = 0; mesh->meshlet_triangles && i < mesh->meshlet_count; i++) {
         uint32_t n = mesh->meshlet_triangles[i];
         if (!n || n > PSC_MESHLET_TRIANGLES)
-            return pen_fail(error, PEN_UNPROCESSABLE, "", "A meshlet of %u triangles.", n);
+            return pen_fail(error, PEN_INVALID, "", "A meshlet of %u triangles.", n);
         triangles += n;
     }
     if (mesh->meshlet_triangles && triangles * 3 != mesh->index_count)
-        return pen_fail(error, PEN_UNPROCESSABLE, "", "Meshlets do not cover their mesh.");
+        return pen_fail(error, PEN_INVALID, "", "Meshlets do not cover their mesh.");
     return true;
 }
 

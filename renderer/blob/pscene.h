@@ -157,7 +157,7 @@ struct psc_scene {
 
 /* Maps the file behind `fd` (which stays the caller's) and checks everything a reader relies on:
  * magic, version, sizes, alignment, every index and offset in range, finite floats, complete mip
- * chains. Errors: PEN_UNPROCESSABLE; *scene is then zeroed. */
+ * chains. Errors: PEN_INVALID; *scene is then zeroed. */
 bool psc_open(int fd, struct psc_scene *scene, struct pen_error *error);
 /* The same over memory that outlives *scene. */
 bool psc_open_memory(

@@ -16,10 +16,9 @@ static bool complete(const struct pen_generated_options *given, struct pen_gener
 {
     *o = *given;
     if (o->kind >= PEN_GENERATED_KINDS)
-        return pen_fail(error, PEN_UNPROCESSABLE, "/kind", "Unknown kind of scene.");
+        return pen_fail(error, PEN_INVALID, "/kind", "Unknown kind of scene.");
     if (o->triangles > MOST_TRIANGLES)
-        return pen_fail(
-            error, PEN_UNPROCESSABLE, "/triangles", "At most %u triangles.", MOST_TRIANGLES);
+        return pen_fail(error, PEN_INVALID, "/triangles", "At most %u triangles.", MOST_TRIANGLES);
     if (!o->triangles)
         o->triangles = 100000;
     if (o->caster_height == 0)
@@ -32,7 +31,7 @@ static bool complete(const struct pen_generated_options *given, struct pen_gener
     const char *const pointers[] = {"/caster_height", "/caster_half_size", "/second_height"};
     for (int i = 0; i < 3; i++)
         if (!(sizes[i] > 0 && sizes[i] <= 100))
-            return pen_fail(error, PEN_UNPROCESSABLE, pointers[i], "Must be in 0 to 100 m.");
+            return pen_fail(error, PEN_INVALID, pointers[i], "Must be in 0 to 100 m.");
     return true;
 }
 

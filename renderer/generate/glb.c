@@ -250,7 +250,7 @@ bool model_to_glb(const struct model *model, void **data, size_t *bytes, struct 
         *data = file;
         *bytes = total;
     } else {
-        pen_fail(error, PEN_UNPROCESSABLE, "/triangles", "Larger than a glTF binary can be.");
+        pen_fail(error, PEN_INVALID, "/triangles", "Larger than a glTF binary can be.");
     }
     free(w.json.data);
     free(w.bin.data);

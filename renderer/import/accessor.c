@@ -79,14 +79,14 @@ bool imp_reader_init(struct imp_reader *reader, const struct imp_document *docum
     snprintf(pointer, sizeof pointer, "/accessors/%d", number);
     memset(reader, 0, sizeof *reader);
     if ((uint32_t)number >= model->accessor_count)
-        return pen_fail(error, PEN_UNPROCESSABLE, pointer, "glTF %s: it does not exist.", pointer);
+        return pen_fail(error, PEN_INVALID, pointer, "glTF %s: it does not exist.", pointer);
     const struct gltf_accessor *accessor = &model->accessors[number];
     uint32_t element_bytes = accessor->components * component_bytes(accessor->component);
     if (!element_bytes)
-        return pen_fail(error, PEN_UNPROCESSABLE, pointer,
+        return pen_fail(error, PEN_INVALID, pointer,
             "glTF %s: its type or componentType does not suit its use.", pointer);
     if (accessor->count > UINT32_MAX - 1)
-        return pen_fail(error, PEN_TOO_LARGE, pointer, "glTF %s: it is too large.", pointer);
+        return pen_fail(error, PEN_TOO_BIG, pointer, "glTF %s: it is too large.", pointer);
     reader->component = accessor->component;
     reader->components = accessor->components;
     reader->normalized = accessor->normalized;
@@ -94,20 +94,20 @@ bool imp_reader_init(struct imp_reader *reader, const struct imp_document *docum
     reader->stride = element_bytes;
     if (accessor->view >= 0) {
         if ((uint32_t)accessor->view >= document->view_count)
-            return pen_fail(error, PEN_UNPROCESSABLE, pointer,
-                "glTF %s: its bufferView does not exist.", pointer);
+            return pen_fail(
+                error, PEN_INVALID, pointer, "glTF %s: its bufferView does not exist.", pointer);
         const struct imp_view *view = &document->views[accessor->view];
         if (view->stride)
             reader->stride = view->stride;
         if (reader->stride < element_bytes ||
             !fits(view, accessor->offset, accessor->count, reader->stride, element_bytes))
-            return pen_fail(error, PEN_UNPROCESSABLE, pointer,
-                "glTF %s: it reaches beyond its bufferView.", pointer);
+            return pen_fail(
+                error, PEN_INVALID, pointer, "glTF %s: it reaches beyond its bufferView.", pointer);
         reader->data = view->data + accessor->offset;
     }
     if (accessor->sparse &&
         (!init_sparse(reader, document, accessor, element_bytes) || !sparse_increases(reader)))
-        return pen_fail(error, PEN_UNPROCESSABLE, pointer,
+        return pen_fail(error, PEN_INVALID, pointer,
             "glTF %s: its sparse part does not fit, or its indices do not increase.", pointer);
     return true;
 }

@@ -13,7 +13,7 @@ struct imp_reader {
     uint32_t sparse_index_bytes, sparse_count;
 };
 
-/* Checks that all of accessor `number` lies inside its views. Errors: PEN_UNPROCESSABLE. */
+/* Checks that all of accessor `number` lies inside its views. Errors: PEN_INVALID. */
 bool imp_reader_init(struct imp_reader *reader, const struct imp_document *document,
     const struct gltf_model *model, int32_t number, struct pen_error *error);
 

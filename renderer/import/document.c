@@ -22,13 +22,13 @@ static bool split_glb(const uint8_t *data, size_t bytes, struct imp_bytes *json,
     struct imp_bytes *bin, struct pen_error *error)
 {
     if (bytes < 20)
-        return pen_fail(error, PEN_UNPROCESSABLE, "", "The glTF binary is truncated.");
+        return pen_fail(error, PEN_INVALID, "", "The glTF binary is truncated.");
     if (u32(data + 4) != 2)
-        return pen_fail(error, PEN_UNPROCESSABLE, "",
+        return pen_fail(error, PEN_INVALID, "",
             "The glTF binary has version %u; only version 2 can be read.", u32(data + 4));
     size_t length = u32(data + 8);
     if (length > bytes || length < 20)
-        return pen_fail(error, PEN_UNPROCESSABLE, "",
+        return pen_fail(error, PEN_INVALID, "",
             "The glTF binary says that it has %zu bytes, but %zu were uploaded.", length, bytes);
     for (size_t at = 12, chunk = 0; at < length; chunk++) {
         if (length - at < 8)
@@ -37,11 +37,11 @@ static bool split_glb(const uint8_t *data, size_t bytes, struct imp_bytes *json,
         uint32_t type = u32(data + at + 4);
         at += 8;
         if (chunk_bytes > length - at)
-            return pen_fail(error, PEN_UNPROCESSABLE, "",
-                "A chunk of the glTF binary is longer than the file.");
+            return pen_fail(
+                error, PEN_INVALID, "", "A chunk of the glTF binary is longer than the file.");
         if ((chunk == 0) != (type == GLB_JSON))
             return pen_fail(
-                error, PEN_UNPROCESSABLE, "", "A glTF binary must start with one JSON chunk.");
+                error, PEN_INVALID, "", "A glTF binary must start with one JSON chunk.");
         if (chunk == 0)
             *json = (struct imp_bytes){data + at, chunk_bytes};
         else if (type == GLB_BIN && !bin->data)
@@ -57,24 +57,23 @@ static bool parse(struct imp_document *document, struct imp_bytes json, struct p
 {
     const char *text = (const char *)json.data, *end = NULL;
     if (json.bytes > IMP_MAX_JSON_BYTES)
-        return pen_fail(error, PEN_TOO_LARGE, "", "The glTF's JSON has more than %u bytes.",
-            IMP_MAX_JSON_BYTES);
+        return pen_fail(
+            error, PEN_TOO_BIG, "", "The glTF's JSON has more than %u bytes.", IMP_MAX_JSON_BYTES);
     if (!imp_json_scan(text, json.bytes, error))
         return false;
     document->root = cJSON_ParseWithLengthOpts(text, json.bytes, &end, 0);
     if (!document->root)
-        return pen_fail(error, PEN_UNPROCESSABLE, "",
-            "The glTF's JSON cannot be parsed, near byte %zu.", end ? (size_t)(end - text) : 0);
+        return pen_fail(error, PEN_INVALID, "", "The glTF's JSON cannot be parsed, near byte %zu.",
+            end ? (size_t)(end - text) : 0);
     for (; end < text + json.bytes; end++)
         if (!strchr(" \t\r\n", *end))
-            return pen_fail(
-                error, PEN_UNPROCESSABLE, "", "The glTF's JSON is followed by something.");
+            return pen_fail(error, PEN_INVALID, "", "The glTF's JSON is followed by something.");
 
     const cJSON *asset = cJSON_GetObjectItemCaseSensitive(document->root, "asset");
     const char *version = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(asset, "version"));
     const char *least = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(asset, "minVersion"));
     if (version && (strncmp(version, "2.", 2) || (least && strcmp(least, "2.0"))))
-        return pen_fail(error, PEN_UNPROCESSABLE, "/asset/version",
+        return pen_fail(error, PEN_INVALID, "/asset/version",
             "The glTF has version %s; only 2.0 can be read.", imp_text(least ? least : version).s);
     return imp_schema_check(document->root, error);
 }
@@ -87,8 +86,8 @@ static bool fetch(cJSON *uri, struct imp_files *files, const char *name, const c
         return imp_files_resolve(files, name, uri->valuestring, pointer, found, error);
     if (imp_data_uri_decode(uri->valuestring, mime, found))
         return true;
-    return pen_fail(error, PEN_UNPROCESSABLE, pointer,
-        "glTF %s: the data URI is damaged or not base64.", pointer);
+    return pen_fail(
+        error, PEN_INVALID, pointer, "glTF %s: the data URI is damaged or not base64.", pointer);
 }
 
 static bool open_buffers(struct imp_document *document, struct imp_bytes bin,
@@ -111,7 +110,7 @@ static bool open_buffers(struct imp_document *document, struct imp_bytes bin,
             *buffer = bin;
         size_t told = (size_t)cJSON_GetObjectItemCaseSensitive(item, "byteLength")->valuedouble;
         if (buffer->data && told > buffer->bytes)
-            return pen_fail(error, PEN_UNPROCESSABLE, pointer,
+            return pen_fail(error, PEN_INVALID, pointer,
                 "glTF %s: byteLength is %zu, but there are only %zu bytes.", pointer, told,
                 buffer->bytes);
         if (buffer->data)
@@ -143,15 +142,15 @@ static bool open_views(struct imp_document *document, struct pen_error *error)
             document
                 ->buffers[(size_t)cJSON_GetObjectItemCaseSensitive(item, "buffer")->valuedouble];
         if (!buffer.data)
-            return pen_fail(error, PEN_UNPROCESSABLE, pointer,
+            return pen_fail(error, PEN_INVALID, pointer,
                 "glTF %s: its buffer has neither a uri nor a binary chunk.", pointer);
         if (first > buffer.bytes || bytes > buffer.bytes - first)
-            return pen_fail(error, PEN_UNPROCESSABLE, pointer,
+            return pen_fail(error, PEN_INVALID, pointer,
                 "glTF %s: it reaches beyond its buffer of %zu bytes.", pointer, buffer.bytes);
         *view = (struct imp_view){
             buffer.data + first, bytes, stride ? (uint32_t)stride->valuedouble : 0};
         if (view->stride % 4)
-            return pen_fail(error, PEN_UNPROCESSABLE, pointer,
+            return pen_fail(error, PEN_INVALID, pointer,
                 "glTF %s: byteStride is not a multiple of 4.", pointer);
     }
     return imp_document_unpack_views(document, error);
@@ -174,7 +173,7 @@ static bool open_images(struct imp_document *document, struct imp_files *files, 
         cJSON *uri = cJSON_GetObjectItemCaseSensitive(item, "uri");
         const cJSON *view = cJSON_GetObjectItemCaseSensitive(item, "bufferView");
         if (!uri == !view)
-            return pen_fail(error, PEN_UNPROCESSABLE, pointer,
+            return pen_fail(error, PEN_INVALID, pointer,
                 "glTF %s: it needs either a uri or a bufferView.", pointer);
         if (uri && !fetch(uri, files, name, pointer, &image->mime, &image->data, error))
             return false;

@@ -34,7 +34,7 @@ struct imp_document {
 
 /* `data` is a .glb or .gltf and must outlive *document, as must `files` (the other files of the
  * upload; empty when there are none), in which it is called `name`. Warnings go to `builder`. On
- * failure *document is empty. Errors: PEN_UNPROCESSABLE, PEN_TOO_LARGE. */
+ * failure *document is empty. Errors: PEN_INVALID, PEN_TOO_BIG. */
 bool imp_document_open(struct imp_document *document, const uint8_t *data, size_t bytes,
     struct imp_files *files, const char *name, struct psc_builder *builder,
     struct pen_error *error);

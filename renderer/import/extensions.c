@@ -42,7 +42,7 @@ bool imp_extensions_check(const cJSON *root, struct psc_builder *builder, struct
     cJSON_ArrayForEach(item, cJSON_GetObjectItemCaseSensitive(root, "extensionsRequired"))
     {
         if (!AMONG(supported, item->valuestring))
-            return pen_fail(error, PEN_UNPROCESSABLE, "/extensionsRequired",
+            return pen_fail(error, PEN_INVALID, "/extensionsRequired",
                 "The glTF requires the extension %s, which is not supported.",
                 imp_text(item->valuestring).s);
     }

@@ -46,7 +46,7 @@ static bool sort_unique(struct imp_files *files, struct pen_error *error)
     qsort(files->items, files->count, sizeof *files->items, by_name);
     for (uint32_t i = 1; i < files->count; i++)
         if (!strcmp(files->items[i - 1].name, files->items[i].name))
-            return pen_fail(error, PEN_UNPROCESSABLE, "", "The upload holds \"%s\" twice.",
+            return pen_fail(error, PEN_INVALID, "", "The upload holds \"%s\" twice.",
                 imp_text(files->items[i].name).s);
     return true;
 }
@@ -56,10 +56,10 @@ static bool bundle_table(
 {
     uint32_t count;
     if (bytes < 16)
-        return pen_fail(error, PEN_UNPROCESSABLE, "", "The bundle is truncated.");
+        return pen_fail(error, PEN_INVALID, "", "The bundle is truncated.");
     memcpy(&count, data + 8, 4);
     if (!count || count > PEN_BUNDLE_MAX_ENTRIES)
-        return pen_fail(error, PEN_TOO_LARGE, "", "A bundle holds 1 to %d files, not %u.",
+        return pen_fail(error, PEN_TOO_BIG, "", "A bundle holds 1 to %d files, not %u.",
             PEN_BUNDLE_MAX_ENTRIES, count);
     files->items = imp_alloc(count, sizeof *files->items);
     size_t at = 16;
@@ -67,22 +67,22 @@ static bool bundle_table(
         uint32_t name_bytes;
         uint64_t data_bytes;
         if (bytes - at < 16)
-            return pen_fail(error, PEN_UNPROCESSABLE, "", "The bundle is truncated.");
+            return pen_fail(error, PEN_INVALID, "", "The bundle is truncated.");
         memcpy(&name_bytes, data + at, 4);
         memcpy(&data_bytes, data + at + 8, 8);
         at += 16;
         if (name_bytes > bytes - at || data_bytes > bytes - at - name_bytes)
-            return pen_fail(error, PEN_UNPROCESSABLE, "", "The bundle is truncated.");
+            return pen_fail(error, PEN_INVALID, "", "The bundle is truncated.");
         const char *name = (const char *)data + at;
         if (!imp_name_is_safe(name, name_bytes))
-            return pen_fail(error, PEN_UNPROCESSABLE, "", "File %u has an unusable name.", i);
+            return pen_fail(error, PEN_INVALID, "", "File %u has an unusable name.", i);
         at += name_bytes;
         files->items[files->count++] = (struct imp_file){
             .name = copy_name(name, name_bytes), .data = data + at, .bytes = (size_t)data_bytes};
         at += (size_t)data_bytes;
     }
     if (at != bytes)
-        return pen_fail(error, PEN_UNPROCESSABLE, "", "The bundle is longer than its table says.");
+        return pen_fail(error, PEN_INVALID, "", "The bundle is longer than its table says.");
     return sort_unique(files, error);
 }
 
@@ -106,11 +106,11 @@ static bool zip_table(
     if (!files->zip) {
         zip_source_free(source);
         zip_error_fini(&why);
-        return pen_fail(error, PEN_UNPROCESSABLE, "", "The zip file is damaged or truncated.");
+        return pen_fail(error, PEN_INVALID, "", "The zip file is damaged or truncated.");
     }
     zip_int64_t count = zip_get_num_entries(files->zip, 0);
     if (count < 1 || count > PEN_BUNDLE_MAX_ENTRIES)
-        return pen_fail(error, count < 1 ? PEN_UNPROCESSABLE : PEN_TOO_LARGE, "",
+        return pen_fail(error, count < 1 ? PEN_INVALID : PEN_TOO_BIG, "",
             "The zip file holds %lld entries; 1 to %d are allowed.", (long long)count,
             PEN_BUNDLE_MAX_ENTRIES);
     files->items = imp_alloc((size_t)count, sizeof *files->items);
@@ -119,26 +119,26 @@ static bool zip_table(
         zip_stat_t entry;
         if (zip_stat_index(files->zip, (zip_uint64_t)i, 0, &entry) ||
             !(entry.valid & ZIP_STAT_NAME) || !(entry.valid & ZIP_STAT_SIZE))
-            return pen_fail(error, PEN_UNPROCESSABLE, "", "The zip file is damaged.");
+            return pen_fail(error, PEN_INVALID, "", "The zip file is damaged.");
         size_t length = strlen(entry.name);
         if (length && entry.name[length - 1] == '/')
             continue; /* a folder */
         if (!imp_name_is_safe(entry.name, length))
-            return pen_fail(error, PEN_UNPROCESSABLE, "",
-                "Entry %lld of the zip has an unusable name.", (long long)i);
+            return pen_fail(error, PEN_INVALID, "", "Entry %lld of the zip has an unusable name.",
+                (long long)i);
         if ((entry.valid & ZIP_STAT_ENCRYPTION_METHOD) && entry.encryption_method != ZIP_EM_NONE)
-            return pen_fail(error, PEN_UNPROCESSABLE, "", "The zip file is encrypted.");
+            return pen_fail(error, PEN_INVALID, "", "The zip file is encrypted.");
         if (entry.size > IMP_MAX_ZIP_BYTES - unpacked)
-            return pen_fail(error, PEN_TOO_LARGE, "",
-                "The zip file unpacks to more than %llu bytes.", IMP_MAX_ZIP_BYTES);
+            return pen_fail(error, PEN_TOO_BIG, "", "The zip file unpacks to more than %llu bytes.",
+                IMP_MAX_ZIP_BYTES);
         unpacked += entry.size;
         files->items[files->count++] = (struct imp_file){.name = copy_name(entry.name, length),
             .bytes = (size_t)entry.size,
             .zip_entry = (uint64_t)i};
     }
     if (unpacked > IMP_ZIP_RATIO_FROM_BYTES && unpacked / IMP_MAX_ZIP_RATIO > bytes)
-        return pen_fail(error, PEN_TOO_LARGE, "", "The zip file is packed more than %d to 1.",
-            IMP_MAX_ZIP_RATIO);
+        return pen_fail(
+            error, PEN_TOO_BIG, "", "The zip file is packed more than %d to 1.", IMP_MAX_ZIP_RATIO);
     return sort_unique(files, error);
 }
 
@@ -198,11 +198,10 @@ const struct imp_file *imp_files_document(struct imp_files *files, struct pen_er
         rival = NULL;
     }
     if (!best)
-        pen_fail(error, PEN_UNPROCESSABLE, "", "There is no .glb or .gltf among the files.");
+        pen_fail(error, PEN_INVALID, "", "There is no .glb or .gltf among the files.");
     else if (rival)
-        pen_fail(error, PEN_UNPROCESSABLE, "",
-            "Both \"%s\" and \"%s\" could be the scene; upload one.", imp_text(best->name).s,
-            imp_text(rival->name).s);
+        pen_fail(error, PEN_INVALID, "", "Both \"%s\" and \"%s\" could be the scene; upload one.",
+            imp_text(best->name).s, imp_text(rival->name).s);
     return rival ? NULL : best;
 }
 
@@ -210,7 +209,7 @@ static bool unpack(struct imp_files *files, struct imp_file *file, struct pen_er
 {
     zip_file_t *entry = zip_fopen_index(files->zip, file->zip_entry, 0);
     if (!entry)
-        return pen_fail(error, PEN_UNPROCESSABLE, "",
+        return pen_fail(error, PEN_INVALID, "",
             "\"%s\" cannot be unpacked: its method is not supported or the zip is damaged.",
             imp_text(file->name).s);
     file->owned = imp_alloc(file->bytes + 1, 1);
@@ -221,8 +220,8 @@ static bool unpack(struct imp_files *files, struct imp_file *file, struct pen_er
         got += (uint64_t)n;
     zip_fclose(entry);
     if (n < 0 || got != file->bytes)
-        return pen_fail(error, PEN_UNPROCESSABLE, "", "\"%s\" is damaged in the zip file.",
-            imp_text(file->name).s);
+        return pen_fail(
+            error, PEN_INVALID, "", "\"%s\" is damaged in the zip file.", imp_text(file->name).s);
     file->data = file->owned;
     return true;
 }
@@ -315,12 +314,12 @@ bool imp_files_resolve(struct imp_files *files, const char *base, const char *ur
     const char *colon = strchr(uri, ':'), *slash = strchr(uri, '/');
     if (uri[0] == '/' || uri[0] == '\\' || (colon && (!slash || colon < slash)) ||
         !join(base, uri, name))
-        return pen_fail(error, PEN_UNPROCESSABLE, pointer,
+        return pen_fail(error, PEN_INVALID, pointer,
             "The glTF refers to \"%s\": only uploaded files, by relative names, can be used.",
             imp_text(uri).s);
     const struct imp_file *file = find(files, name);
     if (!file)
-        return pen_fail(error, PEN_UNPROCESSABLE, pointer,
+        return pen_fail(error, PEN_INVALID, pointer,
             "The glTF refers to \"%s\", which was not uploaded with it.", imp_text(uri).s);
     return imp_files_load(files, file, found, error);
 }

@@ -26,7 +26,7 @@ struct imp_files {
 };
 
 /* Reads the table of a bundle (bundle.h) or zip; the data must outlive *files. On failure *files is
- * empty. Errors: PEN_UNPROCESSABLE (damaged, unsafe or duplicate names, encrypted), PEN_TOO_LARGE.
+ * empty. Errors: PEN_INVALID (damaged, unsafe or duplicate names, encrypted), PEN_TOO_BIG.
  */
 bool imp_files_open_bundle(
     struct imp_files *files, const uint8_t *data, size_t bytes, struct pen_error *error);
@@ -34,16 +34,16 @@ bool imp_files_open_zip(
     struct imp_files *files, const uint8_t *data, size_t bytes, struct pen_error *error);
 void imp_files_finish(struct imp_files *files);
 
-/* The .glb or .gltf to import: the one nearest to the root; PEN_UNPROCESSABLE when there is none,
+/* The .glb or .gltf to import: the one nearest to the root; PEN_INVALID when there is none,
  * or more than one there. */
 const struct imp_file *imp_files_document(struct imp_files *files, struct pen_error *error);
 /* What `uri` (percent-encoded, relative to the folder of the file called `base`) names. A file that
  * is not where the URI says is taken by its last part when that is unique, as forms often drop the
- * folders. Errors, at `pointer`: PEN_UNPROCESSABLE for absolute or outside URIs and files that were
+ * folders. Errors, at `pointer`: PEN_INVALID for absolute or outside URIs and files that were
  * not uploaded. */
 bool imp_files_resolve(struct imp_files *files, const char *base, const char *uri,
     const char *pointer, struct imp_bytes *found, struct pen_error *error);
-/* Unpacks the file when needed. Errors: PEN_UNPROCESSABLE (damaged). */
+/* Unpacks the file when needed. Errors: PEN_INVALID (damaged). */
 bool imp_files_load(struct imp_files *files, const struct imp_file *file, struct imp_bytes *found,
     struct pen_error *error);
 

@@ -407,8 +407,8 @@ void parse(const char *text, size_t bytes, tinygltf::Model &model, struct pen_er
         size_t code_end = failure.find("] "); /* of "[json.exception.parse_error.101] " */
         if (failure.rfind("[json", 0) == 0 && code_end != std::string::npos)
             failure = failure.substr(code_end + 2);
-        pen_fail(error, PEN_UNPROCESSABLE, "", "The glTF cannot be read: %s",
-            imp_text(failure.c_str()).s);
+        pen_fail(
+            error, PEN_INVALID, "", "The glTF cannot be read: %s", imp_text(failure.c_str()).s);
     }
 }
 
@@ -429,11 +429,11 @@ bool gltf_tiny_parse(
             show(*owner, *view);
         }
     } catch (const std::bad_alloc &) {
-        pen_fail(&failure, PEN_TOO_LARGE, "", "The glTF needs more memory than an import may use.");
+        pen_fail(&failure, PEN_TOO_BIG, "", "The glTF needs more memory than an import may use.");
     } catch (const std::exception &) {
-        pen_fail(&failure, PEN_UNPROCESSABLE, "", "The glTF cannot be read.");
+        pen_fail(&failure, PEN_INVALID, "", "The glTF cannot be read.");
     } catch (...) {
-        pen_fail(&failure, PEN_UNPROCESSABLE, "", "The glTF cannot be read.");
+        pen_fail(&failure, PEN_INVALID, "", "The glTF cannot be read.");
     }
     if (failure.code == PEN_OK)
         return true;

@@ -113,7 +113,7 @@ struct gltf_model {
 };
 
 /* Fills *model, to be given back to gltf_tiny_free; on failure it is empty. No exception leaves.
- * Errors: PEN_UNPROCESSABLE with tinygltf's words, PEN_TOO_LARGE when memory runs out. */
+ * Errors: PEN_INVALID with tinygltf's words, PEN_TOO_BIG when memory runs out. */
 bool gltf_tiny_parse(
     const char *text, size_t bytes, struct gltf_model *model, struct pen_error *error);
 void gltf_tiny_free(struct gltf_model *model);

@@ -46,13 +46,12 @@ bool imp_image_header(
         read = imp_webp_header(data, width, height);
         break;
     case IMP_UNKNOWN_IMAGE:
-        return pen_fail(
-            error, PEN_UNSUPPORTED_MEDIA, "", "The image is neither PNG nor JPEG nor WebP.");
+        return pen_fail(error, PEN_UNKNOWN_TYPE, "", "The image is neither PNG nor JPEG nor WebP.");
     }
     if (!read || !*width || !*height)
-        return pen_fail(error, PEN_UNPROCESSABLE, "", "The image's header is damaged.");
+        return pen_fail(error, PEN_INVALID, "", "The image's header is damaged.");
     if ((uint64_t)*width * *height > IMP_MAX_IMAGE_PIXELS)
-        return pen_fail(error, PEN_TOO_LARGE, "",
+        return pen_fail(error, PEN_TOO_BIG, "",
             "The image has %u x %u pixels; %llu million are allowed.", *width, *height,
             IMP_MAX_IMAGE_PIXELS >> 20);
     return true;
@@ -82,7 +81,7 @@ bool imp_image_decode(struct imp_bytes data, uint32_t width, uint32_t height, ui
         return true;
     free(*rgba);
     *rgba = NULL;
-    return pen_fail(error, PEN_UNPROCESSABLE, "", "The image is damaged or truncated.");
+    return pen_fail(error, PEN_INVALID, "", "The image is damaged or truncated.");
 }
 
 static float to_linear(uint8_t x)

@@ -9,14 +9,14 @@ enum imp_image_kind { IMP_UNKNOWN_IMAGE, IMP_PNG, IMP_JPEG, IMP_WEBP };
 enum imp_image_kind imp_image_sniff(struct imp_bytes data);
 const char *imp_image_mime(enum imp_image_kind kind);
 
-/* Reads only the header. Errors: PEN_UNSUPPORTED_MEDIA (no known kind), PEN_UNPROCESSABLE
- * (damaged), PEN_TOO_LARGE (more than IMP_MAX_IMAGE_PIXELS). */
+/* Reads only the header. Errors: PEN_UNKNOWN_TYPE (no known kind), PEN_INVALID
+ * (damaged), PEN_TOO_BIG (more than IMP_MAX_IMAGE_PIXELS). */
 bool imp_image_header(
     struct imp_bytes data, uint32_t *width, uint32_t *height, struct pen_error *error);
 
 /* The pixels as RGBA8, top row first; the caller frees *rgba. `width` and `height` are what
  * imp_image_header gave. *damaged tells that some pixels are missing (JPEG only). Errors:
- * PEN_UNPROCESSABLE. */
+ * PEN_INVALID. */
 bool imp_image_decode(struct imp_bytes data, uint32_t width, uint32_t height, uint8_t **rgba,
     bool *damaged, struct pen_error *error);
 

@@ -45,7 +45,7 @@ static bool import_scene(
     struct imp_files files = {0};
     bool done = false;
     if (!bytes)
-        return pen_fail(error, PEN_UNPROCESSABLE, "", "The upload is empty.");
+        return pen_fail(error, PEN_INVALID, "", "The upload is empty.");
     if (bytes >= 8 && !memcmp(data, PEN_BUNDLE_MAGIC, 8))
         done = imp_files_open_bundle(&files, data, bytes, error) &&
                import_files(builder, &files, error);
@@ -55,7 +55,7 @@ static bool import_scene(
     else if ((bytes >= 4 && !memcmp(data, "glTF", 4)) || is_json(data, bytes))
         done = import_document(builder, (struct imp_bytes){data, bytes}, &files, "", error);
     else
-        pen_fail(error, PEN_UNSUPPORTED_MEDIA, "",
+        pen_fail(error, PEN_UNKNOWN_TYPE, "",
             "The upload is neither glTF binary nor glTF JSON nor a zip of them.");
     imp_files_finish(&files);
     return done;
@@ -69,7 +69,7 @@ static bool import_image(
     bool damaged;
     struct imp_bytes file = {data, bytes};
     if (!bytes)
-        return pen_fail(error, PEN_UNPROCESSABLE, "", "The upload is empty.");
+        return pen_fail(error, PEN_INVALID, "", "The upload is empty.");
     if (!imp_image_header(file, &width, &height, error) ||
         !imp_image_decode(file, width, height, &rgba, &damaged, error))
         return false;
@@ -82,7 +82,7 @@ static bool import_image(
     }
     free(rgba);
     if (damaged)
-        return pen_fail(error, PEN_UNPROCESSABLE, "", "The image is damaged or truncated.");
+        return pen_fail(error, PEN_INVALID, "", "The image is damaged or truncated.");
     return true;
 }
 

@@ -12,8 +12,8 @@ enum pen_import_mode {
 };
 
 /* `source` is the SHA-256 that the blob will carry. On success *blob (the caller frees it) holds a
- * file that psc_open accepts. Errors: PEN_UNSUPPORTED_MEDIA for bytes of no known kind,
- * PEN_TOO_LARGE for more than budget.h allows, PEN_UNPROCESSABLE for everything else that is wrong
+ * file that psc_open accepts. Errors: PEN_UNKNOWN_TYPE for bytes of no known kind,
+ * PEN_TOO_BIG for more than budget.h allows, PEN_INVALID for everything else that is wrong
  * with the upload; pointer names the place in the glTF document where that is known. */
 bool pen_import(const uint8_t *data, size_t bytes, enum pen_import_mode mode,
     const uint8_t source[PEN_ID_BYTES], void **blob, size_t *blob_bytes, struct pen_error *error);

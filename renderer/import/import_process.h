@@ -7,7 +7,7 @@
  * PEN_IMPORT_REPORT_FD a pipe on which it writes exactly one struct pen_error (code PEN_OK: done)
  * before it exits 0. No report, or another exit status: it crashed; the front end answers 422 (2:
  * the arguments are wrong, nothing was read). When memory or CPU time runs out it still reports
- * PEN_TOO_LARGE; only a report of PEN_OK makes what stands in the output worth reading. A report's
+ * PEN_TOO_BIG; only a report of PEN_OK makes what stands in the output worth reading. A report's
  * pointer is a place in the uploaded glTF document. It puts itself into its sandbox (sandbox.h:
  * rlimits, no_new_privs, Landlock, seccomp) before it reads the first byte; the memory limit counts
  * on top of the mapped upload. The kind of source is found from its magic: glTF binary, zip, bundle

@@ -14,26 +14,26 @@ bool imp_json_scan(const char *text, size_t bytes, struct pen_error *error)
         case '[':
         case '{':
             if (++depth > IMP_MAX_JSON_DEPTH)
-                return pen_fail(error, PEN_UNPROCESSABLE, "",
+                return pen_fail(error, PEN_INVALID, "",
                     "The glTF's JSON is nested more than %d deep.", IMP_MAX_JSON_DEPTH);
             values++;
             break;
         case ']':
         case '}':
             if (!depth--)
-                return pen_fail(error, PEN_UNPROCESSABLE, "", "The glTF's JSON is not balanced.");
+                return pen_fail(error, PEN_INVALID, "", "The glTF's JSON is not balanced.");
             break;
         case ',':
             values++;
             break;
         case 0:
-            return pen_fail(error, PEN_UNPROCESSABLE, "", "The glTF's JSON holds a zero byte.");
+            return pen_fail(error, PEN_INVALID, "", "The glTF's JSON holds a zero byte.");
         }
     }
     if (depth)
-        return pen_fail(error, PEN_UNPROCESSABLE, "", "The glTF's JSON ends too early.");
+        return pen_fail(error, PEN_INVALID, "", "The glTF's JSON ends too early.");
     if (values > IMP_MAX_JSON_VALUES)
-        return pen_fail(error, PEN_TOO_LARGE, "", "The glTF's JSON holds more than %u values.",
+        return pen_fail(error, PEN_TOO_BIG, "", "The glTF's JSON holds more than %u values.",
             IMP_MAX_JSON_VALUES);
     return true;
 }

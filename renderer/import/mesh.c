@@ -63,13 +63,13 @@ static void unroll(struct imp_geometry *g, const struct corners *corners, uint32
 static bool too_many_vertices(struct pen_error *error)
 {
     return pen_fail(
-        error, PEN_TOO_LARGE, "", "The scene has more than %llu vertices.", IMP_MAX_VERTICES);
+        error, PEN_TOO_BIG, "", "The scene has more than %llu vertices.", IMP_MAX_VERTICES);
 }
 
 static bool too_many_triangles(struct pen_error *error)
 {
     return pen_fail(
-        error, PEN_TOO_LARGE, "", "The scene has more than %llu triangles.", IMP_MAX_INDICES / 3);
+        error, PEN_TOO_BIG, "", "The scene has more than %llu triangles.", IMP_MAX_INDICES / 3);
 }
 
 static bool read_triangles(struct imp_context *context, struct imp_geometry *g,
@@ -84,7 +84,7 @@ static bool read_triangles(struct imp_context *context, struct imp_geometry *g,
             return false;
         uint32_t c = corners.indices.component;
         if (corners.indices.components != 1 || (c != 5121 && c != 5123 && c != 5125))
-            return pen_fail(error, PEN_UNPROCESSABLE, pointer,
+            return pen_fail(error, PEN_INVALID, pointer,
                 "glTF %s: indices must be unsigned integers.", pointer);
         corners.count = corners.indices.count;
     } else if (vertex_count > IMP_MAX_VERTICES - context->vertex_count) {
@@ -97,7 +97,7 @@ static bool read_triangles(struct imp_context *context, struct imp_geometry *g,
     context->index_count += g->index_count;
     for (uint32_t i = 0; i < g->index_count; i++)
         if (g->indices[i] >= vertex_count)
-            return pen_fail(error, PEN_UNPROCESSABLE, pointer,
+            return pen_fail(error, PEN_INVALID, pointer,
                 "glTF %s: index %u of a primitive with %u vertices.", pointer, g->indices[i],
                 vertex_count);
     return true;
@@ -144,10 +144,10 @@ static bool gather(struct imp_context *context, int32_t accessor, uint32_t least
     if (!imp_reader_init(&reader, context->document, context->model, accessor, error))
         return false;
     if (reader.components < least || reader.components > components)
-        return pen_fail(error, PEN_UNPROCESSABLE, pointer,
-            "glTF %s: its type does not suit the attribute.", pointer);
+        return pen_fail(
+            error, PEN_INVALID, pointer, "glTF %s: its type does not suit the attribute.", pointer);
     if (reader.count < total)
-        return pen_fail(error, PEN_UNPROCESSABLE, pointer,
+        return pen_fail(error, PEN_INVALID, pointer,
             "glTF %s: it has fewer elements than the primitive has vertices.", pointer);
     float *values = imp_alloc((size_t)count * components, sizeof *values);
     *(float **)out = values;
@@ -167,7 +167,7 @@ static bool read_vertices(struct imp_context *context, struct imp_geometry *g,
     bool done = false;
     if (n > IMP_MAX_VERTICES - context->vertex_count) {
         pen_fail(
-            error, PEN_TOO_LARGE, "", "The scene has more than %llu vertices.", IMP_MAX_VERTICES);
+            error, PEN_TOO_BIG, "", "The scene has more than %llu vertices.", IMP_MAX_VERTICES);
         goto fail;
     }
     context->vertex_count += n;
@@ -186,7 +186,7 @@ static bool read_vertices(struct imp_context *context, struct imp_geometry *g,
             if (!(fabsf(g->positions[i][k]) <= FARTHEST)) {
                 char pointer[64];
                 snprintf(pointer, sizeof pointer, "/accessors/%d", primitive->position);
-                pen_fail(error, PEN_UNPROCESSABLE, pointer,
+                pen_fail(error, PEN_INVALID, pointer,
                     "glTF %s: a position is not finite or beyond 1e12 m.", pointer);
                 goto fail;
             }
@@ -248,7 +248,7 @@ bool imp_primitive(
         return false;
     if (positions.count > IMP_MAX_ACCESSOR)
         return pen_fail(
-            error, PEN_TOO_LARGE, "", "The scene has more than %u vertices.", IMP_MAX_ACCESSOR);
+            error, PEN_TOO_BIG, "", "The scene has more than %u vertices.", IMP_MAX_ACCESSOR);
     struct imp_geometry g = {0};
     bool done = read_triangles(context, &g, primitive, positions.count, error);
     if (done && g.index_count)

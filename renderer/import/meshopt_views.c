@@ -36,7 +36,7 @@ static bool unpack(struct imp_view *view, const cJSON *extension, struct imp_byt
                            : (stride == 2 || stride == 4) && none && (!triangles || count % 3 == 0);
     if ((!attributes && !triangles && !is(extension, "mode", "INDICES")) ||
         !(none || octahedral || quaternion || exponential) || !fits)
-        return pen_fail(error, PEN_UNPROCESSABLE, pointer,
+        return pen_fail(error, PEN_INVALID, pointer,
             "glTF %s: the mode, filter, count and byteStride of EXT_meshopt_compression do not fit "
             "together.",
             pointer);
@@ -48,7 +48,7 @@ static bool unpack(struct imp_view *view, const cJSON *extension, struct imp_byt
     else
         failed = meshopt_decodeIndexSequence(out, count, stride, packed.data, packed.bytes);
     if (failed)
-        return pen_fail(error, PEN_UNPROCESSABLE, pointer,
+        return pen_fail(error, PEN_INVALID, pointer,
             "glTF %s: the data of EXT_meshopt_compression are damaged.", pointer);
     if (octahedral)
         meshopt_decodeFilterOct(out, count, stride);
@@ -78,14 +78,14 @@ bool imp_document_unpack_views(struct imp_document *document, struct pen_error *
         uint64_t offset = number(extension, "byteOffset"), bytes = number(extension, "byteLength");
         uint64_t unpacked = (uint64_t)number(extension, "count") * number(extension, "byteStride");
         if (!buffer.data || offset + bytes > buffer.bytes)
-            return pen_fail(error, PEN_UNPROCESSABLE, pointer,
+            return pen_fail(error, PEN_INVALID, pointer,
                 "glTF %s: the compressed data lie outside their buffer.", pointer);
         if (unpacked != number(item, "byteLength"))
-            return pen_fail(error, PEN_UNPROCESSABLE, pointer,
+            return pen_fail(error, PEN_INVALID, pointer,
                 "glTF %s: byteLength is not count times byteStride.", pointer);
         total += unpacked;
         if (total > IMP_MAX_MESHOPT_BYTES)
-            return pen_fail(error, PEN_TOO_LARGE, pointer,
+            return pen_fail(error, PEN_TOO_BIG, pointer,
                 "The glTF's compressed geometry unpacks to more than %llu bytes.",
                 IMP_MAX_MESHOPT_BYTES);
         struct imp_bytes packed = {buffer.data + offset, (size_t)bytes};

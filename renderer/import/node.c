@@ -26,7 +26,7 @@ static bool check_forest(const struct gltf_model *model, struct pen_error *error
         for (uint32_t k = 0; done && k < model->nodes[i].child_count; k++) {
             uint32_t child = (uint32_t)model->children[model->nodes[i].first_child + k];
             if (child >= n || parent[child])
-                done = node_fail(error, PEN_UNPROCESSABLE, child, "it has more than one parent");
+                done = node_fail(error, PEN_INVALID, child, "it has more than one parent");
             else
                 parent[child] = i + 1;
         }
@@ -37,16 +37,16 @@ static bool check_forest(const struct gltf_model *model, struct pen_error *error
             at = parent[at - 1];
         }
         if (at && seen[at - 1] == i + 1)
-            done = node_fail(error, PEN_UNPROCESSABLE, at - 1, "it is its own ancestor");
+            done = node_fail(error, PEN_INVALID, at - 1, "it is its own ancestor");
     }
     for (uint32_t i = 0; i < n; i++)
         seen[i] = 0;
     for (uint32_t i = 0; done && i < model->root_count; i++) {
         uint32_t root = (uint32_t)model->roots[i];
         if (root >= n || parent[root])
-            done = node_fail(error, PEN_UNPROCESSABLE, root, "a scene's node has a parent");
+            done = node_fail(error, PEN_INVALID, root, "a scene's node has a parent");
         else if (seen[root]++)
-            done = node_fail(error, PEN_UNPROCESSABLE, root, "the scene names it twice");
+            done = node_fail(error, PEN_INVALID, root, "the scene names it twice");
     }
     free(parent);
     free(seen);
@@ -86,13 +86,13 @@ static bool add_mesh_at(struct imp_context *context, const struct gltf_node *nod
     float matrix[12];
     for (int i = 0; i < 12; i++) {
         if (!(fabs(world[i]) <= LARGEST))
-            return node_fail(error, PEN_UNPROCESSABLE, number,
-                "its place or size in the world is beyond 1e12 m");
+            return node_fail(
+                error, PEN_INVALID, number, "its place or size in the world is beyond 1e12 m");
         matrix[i] = (float)world[i];
     }
     if (mesh->primitive_count > IMP_MAX_INSTANCES - context->instance_count)
         return node_fail(
-            error, PEN_TOO_LARGE, number, "the scene draws too many instances of its meshes");
+            error, PEN_TOO_BIG, number, "the scene draws too many instances of its meshes");
     context->instance_count += mesh->primitive_count;
     for (uint32_t i = 0; i < mesh->primitive_count; i++) {
         uint32_t psc;
@@ -121,13 +121,13 @@ static bool add_instances(struct imp_context *context, const struct gltf_node *n
         if (!imp_reader_init(&readers[k], context->document, context->model, accessors[k], error))
             return false;
         if (readers[k].components != components[k] || (count && readers[k].count != count))
-            return node_fail(error, PEN_UNPROCESSABLE, number,
+            return node_fail(error, PEN_INVALID, number,
                 "the accessors of EXT_mesh_gpu_instancing do not fit together");
         count = readers[k].count;
     }
     if (count > IMP_MAX_INSTANCES)
         return node_fail(
-            error, PEN_TOO_LARGE, number, "the scene draws too many instances of its meshes");
+            error, PEN_TOO_BIG, number, "the scene draws too many instances of its meshes");
     for (uint32_t i = 0; i < count; i++) {
         float t[3] = {0, 0, 0}, q[4] = {0, 0, 0, 1}, s[3] = {1, 1, 1};
         float *out[3] = {t, q, s};
@@ -204,7 +204,7 @@ static bool walk_tree(
         }
         uint32_t child = (uint32_t)model->children[node->first_child + top->next_child++];
         if (depth == IMP_MAX_NODE_DEPTH)
-            return node_fail(error, PEN_TOO_LARGE, child, "the node hierarchy is too deep");
+            return node_fail(error, PEN_TOO_BIG, child, "the node hierarchy is too deep");
         struct frame *next = &stack[depth++];
         double local[12];
         next->node = child;

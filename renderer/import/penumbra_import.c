@@ -40,10 +40,10 @@ static void on_signal(int number)
 
 static void prepare_handlers(const struct options *options)
 {
-    pen_fail(&out_of_memory, PEN_TOO_LARGE, "",
+    pen_fail(&out_of_memory, PEN_TOO_BIG, "",
         "The upload needs more than the %u MB that an import may use, or breaks a check.",
         options->memory_mb);
-    pen_fail(&out_of_time, PEN_TOO_LARGE, "",
+    pen_fail(&out_of_time, PEN_TOO_BIG, "",
         "The upload needs more than the %u CPU seconds that an import may use.",
         options->cpu_seconds);
     struct sigaction action = {.sa_handler = on_signal, .sa_flags = SA_RESETHAND};
@@ -104,8 +104,8 @@ static bool run(const struct options *options, struct pen_error *error)
     size_t bytes = (size_t)source.st_size;
     void *data = NULL, *blob = NULL;
     if (bytes > PEN_MAX_UPLOAD_BYTES)
-        return pen_fail(error, PEN_TOO_LARGE, "", "The upload is larger than %llu bytes.",
-            PEN_MAX_UPLOAD_BYTES);
+        return pen_fail(
+            error, PEN_TOO_BIG, "", "The upload is larger than %llu bytes.", PEN_MAX_UPLOAD_BYTES);
     /* Mapped before the sandbox so that it does not count against the memory; read after. */
     if (bytes)
         data = mmap(NULL, bytes, PROT_READ, MAP_PRIVATE, PEN_IMPORT_SOURCE_FD, 0);

@@ -55,7 +55,7 @@ bool imp_convert(struct imp_document *document, struct gltf_model *model,
         .warned = imp_alloc(IMP_MAX_WARNINGS, sizeof(uint64_t))};
     bool done = false;
     if (model->primitive_count > IMP_MAX_PRIMITIVES) {
-        pen_fail(error, PEN_TOO_LARGE, "", "The glTF has %u primitives; %u are allowed.",
+        pen_fail(error, PEN_TOO_BIG, "", "The glTF has %u primitives; %u are allowed.",
             model->primitive_count, IMP_MAX_PRIMITIVES);
         goto fail;
     }

@@ -35,7 +35,7 @@ static bool bad(struct walk *walk, const char *what)
     char pointer[128] = "";
     if (walk->at)
         write_pointer(walk->at, pointer);
-    return pen_fail(walk->error, PEN_UNPROCESSABLE, pointer, "glTF %s: %s.", pointer, what);
+    return pen_fail(walk->error, PEN_INVALID, pointer, "glTF %s: %s.", pointer, what);
 }
 
 static bool check_object(struct walk *walk, cJSON *object, const struct schema *schema);
@@ -163,7 +163,7 @@ bool imp_schema_check(cJSON *root, struct pen_error *error)
         int count = cJSON_IsArray(items) ? cJSON_GetArraySize(items) : 0;
         walk.counts[i] = count;
         if ((uint32_t)count > array->most)
-            return pen_fail(error, PEN_TOO_LARGE, "", "The glTF has %d %s; %u are allowed.", count,
+            return pen_fail(error, PEN_TOO_BIG, "", "The glTF has %d %s; %u are allowed.", count,
                 array->key, array->most);
     }
     return check_object(&walk, root, &schema_root);

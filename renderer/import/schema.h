@@ -6,11 +6,11 @@
 
 struct cJSON;
 
-/* Reads the text once, without recursion. Errors: PEN_UNPROCESSABLE (nested more than
- * IMP_MAX_JSON_DEPTH deep, unbalanced), PEN_TOO_LARGE (more than IMP_MAX_JSON_VALUES values). */
+/* Reads the text once, without recursion. Errors: PEN_INVALID (nested more than
+ * IMP_MAX_JSON_DEPTH deep, unbalanced), PEN_TOO_BIG (more than IMP_MAX_JSON_VALUES values). */
 bool imp_json_scan(const char *text, size_t bytes, struct pen_error *error);
 
 /* Removes every member that the table does not know ("extras", foreign extensions ...), so that
- * nothing else reaches the parsers behind it. Errors: PEN_UNPROCESSABLE at the JSON pointer of
- * the offending value, PEN_TOO_LARGE for an array longer than budget.h allows. */
+ * nothing else reaches the parsers behind it. Errors: PEN_INVALID at the JSON pointer of
+ * the offending value, PEN_TOO_BIG for an array longer than budget.h allows. */
 bool imp_schema_check(struct cJSON *root, struct pen_error *error);

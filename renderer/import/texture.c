@@ -92,7 +92,7 @@ static bool image_fail(uint32_t image, const struct pen_error *why, struct pen_e
 {
     char pointer[64];
     snprintf(pointer, sizeof pointer, "/images/%u", image);
-    return pen_fail(error, why->code == PEN_TOO_LARGE ? PEN_TOO_LARGE : PEN_UNPROCESSABLE, pointer,
+    return pen_fail(error, why->code == PEN_TOO_BIG ? PEN_TOO_BIG : PEN_INVALID, pointer,
         "glTF %s: %s", pointer, why->message);
 }
 
@@ -114,7 +114,7 @@ static bool plan_images(struct imp_context *context, struct plan *plans, struct 
                 imp_text(image->mime).s, mime);
         uploaded += (uint64_t)plan->width * plan->height;
         if (uploaded > IMP_MAX_TOTAL_PIXELS)
-            return pen_fail(error, PEN_TOO_LARGE, "",
+            return pen_fail(error, PEN_TOO_BIG, "",
                 "The glTF's images have more than %llu million pixels together.",
                 IMP_MAX_TOTAL_PIXELS >> 20);
         while (plan->width >> plan->halvings > IMP_MAX_IMAGE_SIDE ||

@@ -173,7 +173,7 @@ bool pen_metrics_flip(const struct pen_metrics_image *test,
         .pixels_per_degree = pixels_per_degree > 0 ? pixels_per_degree : PIXELS_PER_DEGREE,
         .space = metrics_colour_srgb()};
     if (!(f.pixels_per_degree >= 4 && f.pixels_per_degree <= 1000)) /* the filters' radius */
-        return pen_fail(error, PEN_UNPROCESSABLE, "", "There must be 4 to 1000 pixels per degree.");
+        return pen_fail(error, PEN_INVALID, "", "There must be 4 to 1000 pixels per degree.");
     double *next = f.memory = malloc(13 * f.pixels * sizeof *f.memory), sum = 0;
     if (!f.memory)
         return pen_fail(error, PEN_INTERNAL, "", "Out of memory.");

@@ -9,13 +9,12 @@ bool metrics_check(const struct pen_metrics_image *test, const struct pen_metric
     uint32_t channels, struct pen_error *error)
 {
     if (test->width != reference->width || test->height != reference->height)
-        return pen_fail(error, PEN_UNPROCESSABLE, "",
-            "The pictures differ in size: %u x %u and %u x %u.", test->width, test->height,
-            reference->width, reference->height);
+        return pen_fail(error, PEN_INVALID, "", "The pictures differ in size: %u x %u and %u x %u.",
+            test->width, test->height, reference->width, reference->height);
     if (test->width == 0 || test->height == 0 || test->width > MAX_SIDE || test->height > MAX_SIDE)
-        return pen_fail(error, PEN_UNPROCESSABLE, "", "The pictures have no or too many pixels.");
+        return pen_fail(error, PEN_INVALID, "", "The pictures have no or too many pixels.");
     if (channels == 0 || test->stride < channels || reference->stride < channels)
-        return pen_fail(error, PEN_UNPROCESSABLE, "", "The pictures lack channels.");
+        return pen_fail(error, PEN_INVALID, "", "The pictures lack channels.");
     return true;
 }
 

@@ -87,7 +87,7 @@ static bool make_words(const struct psc_scene *scene, uint64_t max_bytes, struct
     }
     free(places);
     if (!fits)
-        return pen_fail(error, PEN_TOO_LARGE, "/scene",
+        return pen_fail(error, PEN_TOO_BIG, "/scene",
             "The scene's alpha textures are too large to be ray traced on this GPU.");
     return alpha->words || pen_fail(error, PEN_INTERNAL, "", "Out of memory.");
 }
@@ -137,7 +137,7 @@ bool ray_alpha_make(const struct psc_scene *scene, struct pen_bvh *bvh, uint64_t
     alpha->triangle_count = number_records(scene, bvh, first);
     uint64_t bytes = (uint64_t)alpha->triangle_count * sizeof *alpha->triangles;
     bool ok = bytes <= max_bytes ||
-              pen_fail(error, PEN_TOO_LARGE, "/scene",
+              pen_fail(error, PEN_TOO_BIG, "/scene",
                   "The scene has too many triangles with alpha to be ray traced on this GPU.");
     if (ok && alpha->triangle_count) {
         alpha->triangles = malloc(bytes);

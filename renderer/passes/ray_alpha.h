@@ -17,7 +17,7 @@ struct ray_alpha {
 
 /* Fills *alpha and, in triangles with PEN_BVH_ALPHA, replaces first_index by the number of their
  * record. Records are numbered in the order of instances and of their triangles. Errors:
- * PEN_TOO_LARGE above `max_bytes` in either array, PEN_INTERNAL. */
+ * PEN_TOO_BIG above `max_bytes` in either array, PEN_INTERNAL. */
 bool ray_alpha_make(const struct psc_scene *scene, struct pen_bvh *bvh, uint64_t max_bytes,
     struct ray_alpha *alpha, struct pen_error *error);
 void ray_alpha_finish(struct ray_alpha *alpha); /* harmless on a zeroed one */

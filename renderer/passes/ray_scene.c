@@ -36,7 +36,7 @@ static bool upload_all(struct technique_run *run, const struct pen_bvh *bvh,
     uint64_t records = (uint64_t)alpha->triangle_count * sizeof *alpha->triangles;
     uint64_t bytes = nodes + triangles + records + 4 * alpha->word_count;
     if (nodes > max_block || scene->bytes + bytes > run->ctx->gpu_memory)
-        return pen_fail(error, PEN_TOO_LARGE, "/scene",
+        return pen_fail(error, PEN_TOO_BIG, "/scene",
             "Ray tracing the scene needs %.0f MiB of GPU memory beside its %.0f MiB; %.0f MiB are "
             "allowed.",
             (double)bytes / (1 << 20), (double)scene->bytes / (1 << 20),

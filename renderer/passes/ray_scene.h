@@ -10,7 +10,7 @@ struct ray_scene {
     float extent;                        /* largest absolute coordinate, m */
 };
 
-/* Its memory counts as the scene's. Errors: PEN_TOO_LARGE when it does not fit the budget or a
+/* Its memory counts as the scene's. Errors: PEN_TOO_BIG when it does not fit the budget or a
  * storage buffer of this device, PEN_INTERNAL. */
 const struct ray_scene *ray_scene_get(struct technique_run *run, struct pen_error *error);
 void ray_scene_bind(const struct ray_scene *scene); /* storage buffers 0, 1, 6, 7 */

@@ -251,7 +251,7 @@ static bool sample(struct work *w, struct pen_error *error)
             return true;
     }
     return pen_fail(
-        error, PEN_TOO_LARGE, "/scene", "This device cuts short what it takes to trace the scene.");
+        error, PEN_TOO_BIG, "/scene", "This device cuts short what it takes to trace the scene.");
 }
 
 static void add_counts(const struct work *w)

@@ -68,7 +68,7 @@ static bool trace(struct technique_run *run, struct pen_error *error)
     if (pass_rays_device(run, &job, &s->targets, &refused))
         return true;
 #ifdef PENUMBRA_HAVE_TRACE
-    if (automatic && refused.code == PEN_TOO_LARGE) {
+    if (automatic && refused.code == PEN_TOO_BIG) {
         pen_result_warn(run->result, "Rays were traced on the CPU. %s", refused.message);
         return pass_rays_host(run, &job, &s->targets, error);
     }

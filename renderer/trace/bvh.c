@@ -314,7 +314,7 @@ bool pen_bvh_build_scene(const struct psc_scene *scene, uint64_t max_triangles, 
     struct pen_bvh_triangle *triangles = fits ? gather_triangles(scene, casters, count) : NULL;
     free(casters);
     if (!fits)
-        return pen_fail(error, PEN_TOO_LARGE, "/scene",
+        return pen_fail(error, PEN_TOO_BIG, "/scene",
             "The scene has %llu triangles; %llu can be ray traced.", (unsigned long long)count,
             (unsigned long long)limit);
     if (!triangles)

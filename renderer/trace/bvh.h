@@ -46,7 +46,7 @@ struct pen_bvh {
 };
 
 /* The triangles of all instances that can cast (casters.h). Binned surface-area heuristic (Wald
- * 2007), one thread: about one second per million triangles. Errors: PEN_TOO_LARGE above
+ * 2007), one thread: about one second per million triangles. Errors: PEN_TOO_BIG above
  * `max_triangles` (0: 2^26). */
 bool pen_bvh_build_scene(const struct psc_scene *scene, uint64_t max_triangles, struct pen_bvh *bvh,
     struct pen_error *error);

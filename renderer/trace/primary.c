@@ -131,7 +131,7 @@ bool pen_trace_primary(struct pen_trace_scene *scene, const struct pen_trace_cam
 {
     if (camera->width == 0 || camera->height == 0 || camera->width > 1u << 16 ||
         camera->height > 1u << 16 || !(camera->tan_half_fov_y > 0))
-        return pen_fail(error, PEN_UNPROCESSABLE, "", "The camera has no pixels.");
+        return pen_fail(error, PEN_INVALID, "", "The camera has no pixels.");
     const struct trace_hierarchy *hierarchy =
         trace_hierarchy_get(scene, &(struct trace_silhouette){.shape = TRACE_EYE}, error);
     if (!hierarchy)

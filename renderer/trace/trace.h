@@ -32,7 +32,7 @@ struct pen_trace_scene_info {
 };
 
 /* Flattens all instances; hierarchies are built when first needed. Keeps nothing of *scene: it may
- * be closed afterwards. `options` may be NULL. Errors: PEN_TOO_LARGE over max_bytes, PEN_INTERNAL
+ * be closed afterwards. `options` may be NULL. Errors: PEN_TOO_BIG over max_bytes, PEN_INTERNAL
  * from Embree. */
 struct pen_trace_scene *pen_trace_scene_create(const struct psc_scene *scene,
     const struct pen_trace_scene_options *options, struct pen_error *error);
@@ -123,7 +123,7 @@ struct pen_trace_stats {
  * Sampling: one Owen-scrambled Sobol (0,2)-net per job; every receiver shifts its low bits by a
  * digital XOR of its own, which keeps the net's stratification, turns bands into noise and lets
  * neighbouring rays of a packet aim at the same part of the light.
- * Errors: PEN_UNPROCESSABLE for a bad job, PEN_DEADLINE, PEN_INTERNAL. `stats` may be NULL. */
+ * Errors: PEN_INVALID for a bad job, PEN_DEADLINE, PEN_INTERNAL. `stats` may be NULL. */
 bool pen_trace_visibility(struct pen_trace_scene *scene, const struct pen_trace_light *light,
     const struct pen_trace_job *job, const struct pen_trace_result *result,
     struct pen_trace_stats *stats, struct pen_error *error);

@@ -292,19 +292,19 @@ static bool check_job(
     const struct pen_trace_light *light, const struct pen_trace_job *job, struct pen_error *error)
 {
     if (light->type > PEN_TRACE_POINT)
-        return pen_fail(error, PEN_UNPROCESSABLE, "", "There is no light type %u.", light->type);
+        return pen_fail(error, PEN_INVALID, "", "There is no light type %u.", light->type);
     bool area = light->type != PEN_TRACE_POINT;
     if ((area && !(light->half[0] > 0)) || (light->type == PEN_TRACE_RECT && !(light->half[1] > 0)))
-        return pen_fail(error, PEN_UNPROCESSABLE, "", "The light has no extent.");
+        return pen_fail(error, PEN_INVALID, "", "The light has no extent.");
     if (light->emission && (light->columns == 0 || light->rows == 0 || light->columns > 1u << 16 ||
                                light->rows > 1u << 16))
-        return pen_fail(error, PEN_UNPROCESSABLE, "", "The light's emission has no texels.");
+        return pen_fail(error, PEN_INVALID, "", "The light's emission has no texels.");
     if (job->width == 0 || job->height == 0 ||
         (uint64_t)job->width * job->height >= (uint64_t)1 << 31)
-        return pen_fail(error, PEN_UNPROCESSABLE, "", "The job has no or too many receivers.");
+        return pen_fail(error, PEN_INVALID, "", "The job has no or too many receivers.");
     if (job->samples == 0 || job->samples > TRACE_MAX_SAMPLES)
         return pen_fail(
-            error, PEN_UNPROCESSABLE, "", "The sample count must be 1 to %u.", TRACE_MAX_SAMPLES);
+            error, PEN_INVALID, "", "The sample count must be 1 to %u.", TRACE_MAX_SAMPLES);
     return true;
 }
 

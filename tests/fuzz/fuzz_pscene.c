@@ -67,7 +67,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     if (psc_open_memory(file, bytes, &scene, &error)) {
         if (!walk_blob(&scene, &sum))
             abort();
-    } else if (error.code != PEN_UNPROCESSABLE || scene.header) {
+    } else if (error.code != PEN_INVALID || scene.header) {
         abort();
     }
     free(file);

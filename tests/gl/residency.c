@@ -127,7 +127,7 @@ static void check_hierarchy(void)
     fixture_scene(r, PEN_GENERATED_HAIRBALL, 6 * TRIANGLES, 1, large);
     traced_request(&request, large);
     CHECK(!pen_renderer_render(r, &request, &frame, &result, &error));
-    CHECK(error.code == PEN_TOO_LARGE);
+    CHECK(error.code == PEN_TOO_BIG);
     fixture_request(&request, large, "hard");
     fixture_render(r, &request, &result);
     pen_renderer_destroy(r);

@@ -119,7 +119,7 @@ static void refused(const struct psc_mesh *mesh)
     struct pen_error error = {0};
     uint32_t primitive;
     CHECK(!psc_builder_add_mesh(b, mesh, &primitive, &error));
-    CHECK(error.code == PEN_UNPROCESSABLE && error.message[0]);
+    CHECK(error.code == PEN_INVALID && error.message[0]);
     psc_builder_destroy(b);
 }
 
@@ -164,7 +164,7 @@ static void refusals(void)
         void *data;
         size_t bytes;
         CHECK(!psc_builder_finish(b, no_source, &data, &bytes, &error));
-        CHECK(error.code == PEN_UNPROCESSABLE && !data);
+        CHECK(error.code == PEN_INVALID && !data);
         psc_builder_destroy(b);
     }
 }

@@ -44,7 +44,7 @@ static bool try_blob(const void *blob, size_t bytes)
     struct psc_scene s;
     struct pen_error error = {0};
     bool ok = psc_open_memory(copy, bytes, &s, &error);
-    CHECK(ok || (error.code == PEN_UNPROCESSABLE && error.message[0] && !s.header));
+    CHECK(ok || (error.code == PEN_INVALID && error.message[0] && !s.header));
     if (ok)
         CHECK(walk_blob(&s, &total));
     free(copy);

@@ -82,7 +82,7 @@ static void check_answer(void)
     struct pen_result results[3] = {{.completed = compare.requests[0]},
         {.completed = compare.requests[1],
             .comparison = {.rmse = 0.25, .penumbra_rmse = 0.5, .ssim = 0.75, .penumbra_pixels = 9}},
-        {.error = {.code = PEN_UNPROCESSABLE, .message = "It cannot."}}};
+        {.error = {.code = PEN_INVALID, .message = "It cannot."}}};
     results[1].stage_ms[PEN_STAGE_SHADOW] = 2;
     results[1].stage_ms[PEN_STAGE_TECHNIQUE] = 3;
     results[1].stage_ms[PEN_STAGE_SHADE] = 5;

@@ -211,7 +211,7 @@ static void test_record(void)
 static void test_problem(void)
 {
     struct pen_error error = {0};
-    pen_fail(&error, PEN_UNPROCESSABLE, "/width", "width is \"%s\".", "\x80\x01");
+    pen_fail(&error, PEN_INVALID, "/width", "width is \"%s\".", "\x80\x01");
     cJSON *root = parsed(pen_problem_json(&error, "id-1"));
     CHECK_STR(at(root, "type")->valuestring, "about:blank");
     CHECK_STR(at(root, "title")->valuestring, "Unprocessable Content");

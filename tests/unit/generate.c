@@ -118,7 +118,7 @@ static void refused(struct pen_generated_options options, const char *pointer)
     void *data;
     size_t bytes;
     CHECK(!pen_generate_blob(&options, &data, &bytes, &error));
-    CHECK(error.code == PEN_UNPROCESSABLE);
+    CHECK(error.code == PEN_INVALID);
     CHECK_STR(error.pointer, pointer);
 }
 

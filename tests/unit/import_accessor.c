@@ -65,7 +65,7 @@ static void component_types(void)
         imported_free(&r);
     }
     struct imported r = one_triangle((float[11]){0}, 43, 5126, false, 16);
-    CHECK(!r.ok && r.error.code == PEN_UNPROCESSABLE);
+    CHECK(!r.ok && r.error.code == PEN_INVALID);
     CHECK_STR(r.error.pointer, "/accessors/0");
     imported_free(&r);
 }
@@ -141,7 +141,7 @@ static void sparse(void)
                       "\"buffers\":[{\"byteLength\":64,\"uri\":\"data:;base64,%s\"}]}",
                 base64(&buffer, sizeof buffer));
         struct imported r = import_json(json);
-        CHECK(!r.ok && r.error.code == PEN_UNPROCESSABLE);
+        CHECK(!r.ok && r.error.code == PEN_INVALID);
         imported_free(&r);
         free(json);
     }

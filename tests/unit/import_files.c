@@ -90,18 +90,18 @@ static void uris(void)
     check("model/scene.gltf", "data/a.bin", "model/data/a.bin", PEN_OK);
     check("model/scene.gltf", "../a.bin", "a.bin", PEN_OK);
     check("scene.gltf", "data/a.bin", "a.bin", PEN_OK); /* a form dropped the folder */
-    check("scene.gltf", "b.bin", "a.bin", PEN_UNPROCESSABLE);
-    check("scene.gltf", "../a.bin", "a.bin", PEN_UNPROCESSABLE);
-    check("model/scene.gltf", "../../a.bin", "a.bin", PEN_UNPROCESSABLE);
-    check("scene.gltf", "/a.bin", "a.bin", PEN_UNPROCESSABLE);
-    check("scene.gltf", "%2e%2e/a.bin", "a.bin", PEN_UNPROCESSABLE);
-    check("scene.gltf", "file:///a.bin", "a.bin", PEN_UNPROCESSABLE);
-    check("scene.gltf", "http://localhost/a.bin", "a.bin", PEN_UNPROCESSABLE);
-    check("scene.gltf", "a.bin%00.png", "a.bin", PEN_UNPROCESSABLE);
-    check("scene.gltf", "C:\\\\a.bin", "a.bin", PEN_UNPROCESSABLE);
-    check("scene.gltf", "", "a.bin", PEN_UNPROCESSABLE);
-    check("scene.txt", "a.bin", "a.bin", PEN_UNPROCESSABLE);
-    check("../scene.gltf", "a.bin", "a.bin", PEN_UNPROCESSABLE);
+    check("scene.gltf", "b.bin", "a.bin", PEN_INVALID);
+    check("scene.gltf", "../a.bin", "a.bin", PEN_INVALID);
+    check("model/scene.gltf", "../../a.bin", "a.bin", PEN_INVALID);
+    check("scene.gltf", "/a.bin", "a.bin", PEN_INVALID);
+    check("scene.gltf", "%2e%2e/a.bin", "a.bin", PEN_INVALID);
+    check("scene.gltf", "file:///a.bin", "a.bin", PEN_INVALID);
+    check("scene.gltf", "http://localhost/a.bin", "a.bin", PEN_INVALID);
+    check("scene.gltf", "a.bin%00.png", "a.bin", PEN_INVALID);
+    check("scene.gltf", "C:\\\\a.bin", "a.bin", PEN_INVALID);
+    check("scene.gltf", "", "a.bin", PEN_INVALID);
+    check("scene.txt", "a.bin", "a.bin", PEN_INVALID);
+    check("../scene.gltf", "a.bin", "a.bin", PEN_INVALID);
 }
 
 static void bundles(void)
@@ -121,7 +121,7 @@ static void bundles(void)
     CHECK(!r.ok);
     upload[9] = 0xff; /* 65282 entries */
     r = import_bytes(upload, bytes);
-    CHECK(r.error.code == PEN_TOO_LARGE);
+    CHECK(r.error.code == PEN_TOO_BIG);
     r = import_bytes(upload, make_bundle(upload, twice, 2));
     CHECK(!r.ok && strstr(r.error.message, "twice"));
     r = import_bytes(upload, make_bundle(upload, two, 2));

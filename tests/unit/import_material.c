@@ -196,13 +196,13 @@ static void formats(void)
     CHECK(r.ok && !memcmp(texel(&r.scene, 0, 0, 0), four, 8) && texel(&r.scene, 0, 1, 1)[3] == 128);
     imported_free(&r);
     r = one_image((struct bytes){webp, webp_bytes / 2}, "image/webp", "\"source\":0");
-    CHECK(!r.ok && r.error.code == PEN_UNPROCESSABLE);
+    CHECK(!r.ok && r.error.code == PEN_INVALID);
     CHECK_STR(r.error.pointer, "/images/0");
     imported_free(&r);
     WebPFree(webp);
 
     r = one_image((struct bytes){(uint8_t *)"GIF89a..........", 16}, "image/gif", "\"source\":0");
-    CHECK(!r.ok && r.error.code == PEN_UNPROCESSABLE && strstr(r.error.message, "PNG"));
+    CHECK(!r.ok && r.error.code == PEN_INVALID && strstr(r.error.message, "PNG"));
     imported_free(&r);
     r = one_image((struct bytes){(uint8_t *)"x", 1}, "image/ktx2",
         "\"extensions\":{\"KHR_texture_basisu\":{\"source\":0}}");
@@ -259,7 +259,7 @@ static void too_many_pixels(void)
                   "{\"uri\":\"data:;base64,%s\"}]}",
         uri, uri, uri, uri, uri);
     struct imported r = import_json(json);
-    CHECK(r.error.code == PEN_TOO_LARGE && strstr(r.error.message, "together"));
+    CHECK(r.error.code == PEN_TOO_BIG && strstr(r.error.message, "together"));
     imported_free(&r);
     free(json);
     free(file.data);

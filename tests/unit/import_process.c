@@ -72,7 +72,7 @@ static void out_of_memory(const char *folder)
                      "\"componentType\":5126,\"count\":15000000,\"type\":\"VEC3\"}]}");
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
     struct run run = run_importer(path, "--memory-mb=64");
-    CHECK(run.status == 0 && run.reported && run.error.code == PEN_TOO_LARGE);
+    CHECK(run.status == 0 && run.reported && run.error.code == PEN_TOO_BIG);
     CHECK(run.memory_mb < 128 && !run.blob);
     CHECK(strstr(run.error.message, "64 MB"));
     free(run.blob);

@@ -189,7 +189,7 @@ static void test_refusals(void)
     double value;
     struct pen_error error = {0};
     b.width--;
-    CHECK(!pen_metrics_rmse(&a, &b, 3, &value, &error) && error.code == PEN_UNPROCESSABLE);
+    CHECK(!pen_metrics_rmse(&a, &b, 3, &value, &error) && error.code == PEN_INVALID);
     CHECK(!pen_metrics_ssim(&a, &b, NULL, &value, NULL));
     CHECK(!pen_metrics_flip(&a, &b, 0, NULL, &value, NULL));
     b = a;

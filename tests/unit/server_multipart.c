@@ -13,7 +13,7 @@ static bool begin(void *context, const char *name, struct pen_error *error)
 {
     (void)context;
     if (!strcmp(name, "refused"))
-        return pen_fail(error, PEN_UNPROCESSABLE, "", "Not this one.");
+        return pen_fail(error, PEN_INVALID, "", "Not this one.");
     snprintf(got.names[got.count++], sizeof got.names[0], "%s", name);
     return true;
 }
@@ -79,23 +79,23 @@ static void test_broken(void)
         const char *type, *body;
         uint32_t code;
     } rows[] = {
-        {"multipart/form-data", "", PEN_UNSUPPORTED_MEDIA},
-        {"multipart/form-data; boundary=", "", PEN_UNSUPPORTED_MEDIA},
-        {"multipart/form-data; boundary=\"x", "", PEN_UNSUPPORTED_MEDIA},
-        {"multipart/form-data; notboundary=x", "", PEN_UNSUPPORTED_MEDIA},
+        {"multipart/form-data", "", PEN_UNKNOWN_TYPE},
+        {"multipart/form-data; boundary=", "", PEN_UNKNOWN_TYPE},
+        {"multipart/form-data; boundary=\"x", "", PEN_UNKNOWN_TYPE},
+        {"multipart/form-data; notboundary=x", "", PEN_UNKNOWN_TYPE},
         {"multipart/form-data; "
          "boundary=xxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxx",
-            "", PEN_UNSUPPORTED_MEDIA},
-        {TYPE, "", PEN_BAD_REQUEST},
-        {TYPE, "nothing here", PEN_BAD_REQUEST},
-        {TYPE, "--xYz\r\n" PART("a") "1", PEN_BAD_REQUEST},
-        {TYPE, "--xYz\r\n" PART("a") "1\r\n--xYz-", PEN_BAD_REQUEST},
-        {TYPE, "--xYz\r\n\r\nno header\r\n--xYz--", PEN_BAD_REQUEST},
-        {TYPE, "--xYz\r\nContent-Type: a/b\r\n\r\n1\r\n--xYz--", PEN_BAD_REQUEST},
-        {TYPE, "--xYzz\r\n" PART("a") "1\r\n--xYz--", PEN_BAD_REQUEST},
+            "", PEN_UNKNOWN_TYPE},
+        {TYPE, "", PEN_MALFORMED},
+        {TYPE, "nothing here", PEN_MALFORMED},
+        {TYPE, "--xYz\r\n" PART("a") "1", PEN_MALFORMED},
+        {TYPE, "--xYz\r\n" PART("a") "1\r\n--xYz-", PEN_MALFORMED},
+        {TYPE, "--xYz\r\n\r\nno header\r\n--xYz--", PEN_MALFORMED},
+        {TYPE, "--xYz\r\nContent-Type: a/b\r\n\r\n1\r\n--xYz--", PEN_MALFORMED},
+        {TYPE, "--xYzz\r\n" PART("a") "1\r\n--xYz--", PEN_MALFORMED},
         {TYPE, "--xYz\r\nContent-Transfer-Encoding: base64\r\n" PART("a") "1\r\n--xYz--",
-            PEN_BAD_REQUEST},
-        {TYPE, "--xYz\r\n" PART("refused") "1\r\n--xYz--", PEN_UNPROCESSABLE},
+            PEN_MALFORMED},
+        {TYPE, "--xYz\r\n" PART("refused") "1\r\n--xYz--", PEN_INVALID},
     };
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++)
         for (size_t piece = 1; piece < 40; piece += 6)
@@ -103,7 +103,7 @@ static void test_broken(void)
     /* A header without an end is refused long before memory runs out. */
     static char long_header[100000] = "--xYz\r\nX: ";
     memset(long_header + 10, 'a', sizeof long_header - 10);
-    CHECK(feed(TYPE, long_header, sizeof long_header, 1000) == PEN_BAD_REQUEST);
+    CHECK(feed(TYPE, long_header, sizeof long_header, 1000) == PEN_MALFORMED);
 }
 
 int main(void)

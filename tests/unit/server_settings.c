@@ -87,7 +87,7 @@ static void test_auth(void)
     auth_destroy(auth);
     struct pen_error error = {0};
     CHECK(ftruncate(fd, 4) == 0);
-    CHECK(!auth_load(path, &error) && error.code == PEN_UNPROCESSABLE);
+    CHECK(!auth_load(path, &error) && error.code == PEN_INVALID);
     CHECK(pwrite(fd, "short\n", 6, 0) == 6);
     CHECK(!auth_load(path, NULL));
     unlink(path);

@@ -139,7 +139,7 @@ static void test_uploads(void)
     CHECK(count_files("tmp") == 0);
     struct pen_error error = {0};
     upload = upload_create(store, "model/gltf-binary", 3, NULL);
-    CHECK(!upload_add(upload, "abcd", 4, &error) && error.code == PEN_TOO_LARGE);
+    CHECK(!upload_add(upload, "abcd", 4, &error) && error.code == PEN_TOO_BIG);
     upload_destroy(upload);
     CHECK(count_files("tmp") == 0);
     scene_store_close(store);

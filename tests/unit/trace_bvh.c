@@ -241,7 +241,7 @@ static void test_scene(void)
         CHECK(pen_bvh_occluded(&bvh, high, down, 1) == (i == 2));
     }
     pen_bvh_finish(&bvh);
-    CHECK(!pen_bvh_build_scene(&scene, 2, &bvh, &error) && error.code == PEN_TOO_LARGE);
+    CHECK(!pen_bvh_build_scene(&scene, 2, &bvh, &error) && error.code == PEN_TOO_BIG);
     free(data);
     psc_builder_destroy(builder);
 }

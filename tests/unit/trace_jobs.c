@@ -372,16 +372,16 @@ static void test_refusals(struct pen_trace_scene *scene, struct picture *p)
         CHECK(!pen_trace_visibility(scene, &light, &job, &result, NULL, &error));                  \
         CHECK(error.code == code_);                                                                \
     } while (0)
-    REFUSED(PEN_UNPROCESSABLE, job.samples = 0);
-    REFUSED(PEN_UNPROCESSABLE, job.samples = 65537);
-    REFUSED(PEN_UNPROCESSABLE, job.width = 0);
-    REFUSED(PEN_UNPROCESSABLE, (job.width = 1 << 16, job.height = 1 << 15));
+    REFUSED(PEN_INVALID, job.samples = 0);
+    REFUSED(PEN_INVALID, job.samples = 65537);
+    REFUSED(PEN_INVALID, job.width = 0);
+    REFUSED(PEN_INVALID, (job.width = 1 << 16, job.height = 1 << 15));
     REFUSED(PEN_DEADLINE, job.deadline_ns = 1);
-    REFUSED(PEN_UNPROCESSABLE, light.half[1] = 0);
+    REFUSED(PEN_INVALID, light.half[1] = 0);
     light.half[1] = NAN;
-    REFUSED(PEN_UNPROCESSABLE, (void)0);
+    REFUSED(PEN_INVALID, (void)0);
     light = downward_light(PEN_TRACE_POINT + 1, 1);
-    REFUSED(PEN_UNPROCESSABLE, (void)0);
+    REFUSED(PEN_INVALID, (void)0);
 
     /* What is no receiver is lit, whatever it holds. */
     light = downward_light(PEN_TRACE_RECT, 0.5f);
@@ -414,10 +414,10 @@ static void test_refusals(struct pen_trace_scene *scene, struct picture *p)
         CHECK(!pen_trace_visibility(small, &light, &job, &result, NULL, &error));
         pen_trace_scene_destroy(small);
     }
-    CHECK(error.code == PEN_TOO_LARGE);
+    CHECK(error.code == PEN_TOO_BIG);
     options.max_bytes = 1000;
     error = (struct pen_error){0};
-    CHECK(!pen_trace_scene_create(&blob, &options, &error) && error.code == PEN_TOO_LARGE);
+    CHECK(!pen_trace_scene_create(&blob, &options, &error) && error.code == PEN_TOO_BIG);
     free(data);
     psc_builder_destroy(builder);
 }

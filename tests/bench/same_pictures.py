@@ -38,41 +38,37 @@ def light(kind, **more):
 
 
 def moved(row):
-    """A value of a parameter row's schema that is not its default, or None."""
-    default, choices = row.get("default"), row.get("enum")
+    """A value of a parameter row that is not its default, or None."""
+    default, choices = row.get("default"), row.get("choices")
     if choices:
         return next((c for c in choices if c != default), None)
-    if row.get("type") == "boolean":
+    if row["type"] == "flag":
         return not default
-    if row.get("type") not in ("integer", "number"):
+    if row["components"] != 1:
         return None
-    low, high = row.get("minimum", 0), row.get("maximum", 1e9)
-    whole = row["type"] == "integer"
     for factor in (0.5, 2, 0.75):
         value = default * factor
-        if whole:
-            # Sizes of maps and windows are mostly powers of two; so are their halves.
+        if row["type"] != "float":
             value = int(value)
-        if low <= value <= high and value != default:
+        if row["min"] <= value <= row["max"] and value != default:
             return value
-    return low if default != low else None
+    return row["min"] if default != row["min"] else None
 
 
 def requests(techniques, openapi):
     """(name, scene, request) for the whole set."""
     schemas = openapi["components"]["schemas"]
-    output = schemas["Output"]["properties"] if "Output" in schemas else \
-        schemas["RenderRequest"]["properties"]["output"]["properties"]
+    output = schemas["Output"]["properties"]
     layers, formats = output["layer"]["enum"], output["format"]["enum"]
     for t in techniques:
         name = t["name"]
         yield "method/" + name, "demo", {"technique": name}
         yield "masked/" + name, "foliage", {"technique": name}
-        for key, row in t["params"]["properties"].items():
+        for row in t["params"]:
             value = moved(row)
             if value is not None:
-                yield "param/%s/%s=%s" % (name, key, value), "demo", {
-                    "technique": {"name": name, "params": {key: value}}}
+                yield "param/%s/%s=%s" % (name, row["name"], value), "demo", {
+                    "technique": {"name": name, "params": {row["name"]: value}}}
         for kind in LIGHTS:
             yield "light/%s/%s" % (kind, name), "columns", {
                 "technique": name, "lights": [light(kind)]}
@@ -87,7 +83,7 @@ def requests(techniques, openapi):
                         "output": {"layer": layer, "format": form, "bit_depth": bits}}
     for tone in ("none", "reinhard", "aces"):
         yield "tone/" + tone, "demo", {"tone_map": tone, "exposure_ev": 0.5}
-    for kind in ("candle", "bars"):
+    for kind in ("candle-flame", "two-colour"):
         for name in ("pcss", "adaptive", "raytraced", "multisample"):
             yield "textured/%s/%s" % (kind, name), "demo", {
                 "technique": name, "lights": [light("rect", texture={"pattern": kind})]}

@@ -1,9 +1,9 @@
 #include "renderer/renderer.h"
-#include "renderer/frame.h"
+#include "renderer/frame/frame.h"
 #include "renderer/generate/generate.h"
 #include "renderer/gl/context.h"
-#include "renderer/passes/scratch.h"
-#include "renderer/passes/shadow_cache.h"
+#include "renderer/passes/draw/scratch.h"
+#include "renderer/passes/map/shadow_cache.h"
 #include <stdlib.h>
 #include <string.h>
 

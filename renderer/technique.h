@@ -9,9 +9,9 @@
 #include "renderer/gl/program.h"
 #include "renderer/gl/texture.h"
 #include "renderer/gl/timer.h"
-#include "renderer/light.h"
-#include "renderer/scene.h"
-#include "renderer/view.h"
+#include "renderer/light/light.h"
+#include "renderer/scene/scene.h"
+#include "renderer/scene/view.h"
 
 struct shadow_cache;
 
@@ -25,14 +25,14 @@ struct technique_ctx {
     GLuint empty_array;              /* vertex array for passes that make their own vertices */
     GLuint light_block, param_block; /* uniform buffers, GL_UBO_LIGHT and GL_UBO_PARAMS */
     struct gl_texture white;         /* 1 x 1, bound where a light has no emission texture */
-    struct gl_texture tiles;         /* of passes/classify.c */
+    struct gl_texture tiles;         /* of passes/map/classify.c */
     GLuint tiles_framebuffer;
-    struct gl_texture interleaved; /* scratch of passes/interleave.c */
+    struct gl_texture interleaved; /* scratch of passes/filter/interleave.c */
     GLuint interleaved_framebuffer;
-    struct gl_texture sample_scratch; /* of passes/sample_maps.c */
+    struct gl_texture sample_scratch; /* of passes/light/sample_maps.c */
     struct gl_texture sum;            /* RGBA32F accumulator of methods that add passes */
     GLuint sum_framebuffer;
-    struct gl_texture scratch[12]; /* of passes/scratch.c */
+    struct gl_texture scratch[12]; /* of passes/draw/scratch.c */
     uint64_t gpu_memory;           /* the budget of everything, bytes */
     uint64_t shadow_memory;        /* bytes that kept shadow inputs of a frame may take together */
     uint64_t shadow_budget; /* the share of one face of one light in it; set for every frame */

@@ -1,4 +1,4 @@
-// Integral of emission over rectangles of the emitter, divided by its area (passes/emission_sat.h).
+// Integral of emission over rectangles of the emitter, divided by its area (passes/light/emission_sat.h).
 layout(binding = 9) uniform sampler2D emission_sums;
 
 vec3 emission_below(vec2 corner)

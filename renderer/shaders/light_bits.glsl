@@ -1,4 +1,4 @@
-// Occlusion bits of the emitter's points (passes/light_bits.h). LIGHT_BITS is 64 or 256; patches
+// Occlusion bits of the emitter's points (passes/light/light_bits.h). LIGHT_BITS is 64 or 256; patches
 // that overlap set the same bits, so casters behind one another count once.
 layout(binding = 8) uniform usampler2DArray bits_below; // (step, 2 pattern + axis, 128 bits)
 const int BIT_LAYERS = LIGHT_BITS == 256 ? 2 : 1;

@@ -1,7 +1,7 @@
-// The min-max pyramid of linear depth (passes/min_max.c): bounds over windows of the map.
+// The min-max pyramid of linear depth (passes/map/min_max.c): bounds over windows of the map.
 #ifdef MIN_MAX_LAYERED
 // Hardware depth of layers, nearest first, so that the first one bounds all: r min, g max, b mean.
-// The side is a power of two that may reach over the map's (passes/peel.h).
+// The side is a power of two that may reach over the map's (passes/map/peel.h).
 layout(binding = 14) uniform sampler2DArray min_max_pyramid;
 
 vec2 min_max_at(ivec2 at, int level)

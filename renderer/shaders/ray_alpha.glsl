@@ -1,4 +1,4 @@
-// Triangles whose alpha decides: struct ray_alpha_triangle and the words of passes/ray_scene.c. What
+// Triangles whose alpha decides: struct ray_alpha_triangle and the words of passes/rays/ray_scene.c. What
 // is computed is what renderer/trace/filter.c computes.
 struct AlphaTriangle {
     vec2 uv[3];   // transform applied

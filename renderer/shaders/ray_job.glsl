@@ -1,4 +1,4 @@
-// What all shaders of passes/rays_device.c share: the job, its points, receivers and results.
+// What all shaders of passes/rays/rays_device.c share: the job, its points, receivers and results.
 layout(std140, binding = 3) uniform RayBlock {
     vec4 origin; // centre of the emitter, world; w: cosine of the cone
     vec4 a, b;   // half axes

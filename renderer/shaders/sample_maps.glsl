@@ -1,4 +1,4 @@
-// Lookups in the depth maps of points of the emitter (passes/sample_maps.h).
+// Lookups in the depth maps of points of the emitter (passes/light/sample_maps.h).
 struct SampleMap {
     vec4 at;     // xy emitter position, zw the same in [-1, 1]^2
     vec4 window; // uv = l * xy + zw

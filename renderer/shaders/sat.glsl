@@ -1,4 +1,4 @@
-// Means of windows from a modular summed-area table (passes/sat.c).
+// Means of windows from a modular summed-area table (passes/map/sat.c).
 layout(binding = 8) uniform usampler2D sat; // texel (x, y): sum over [0, x) x [0, y), mod 2^32
 layout(std140, binding = 3) uniform SatBlock {
     vec4 sat_info; // 1 / scale, side, widest window in texels

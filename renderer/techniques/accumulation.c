@@ -1,4 +1,4 @@
-#include "renderer/passes/light_bits.h"
+#include "renderer/passes/light/light_bits.h"
 #include "renderer/techniques/patch_params.h"
 
 static const char *const mode_names[] = {"paper", "clipped", NULL};

@@ -1,5 +1,5 @@
-#include "renderer/passes/classify.h"
-#include "renderer/passes/interleave.h"
+#include "renderer/passes/map/classify.h"
+#include "renderer/passes/filter/interleave.h"
 #include "renderer/techniques/convolution_params.h"
 
 static const char *const mode_names[] = {"adaptive", "fixed2", "average", NULL};

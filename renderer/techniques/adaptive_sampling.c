@@ -1,6 +1,6 @@
-#include "renderer/passes/classify.h"
-#include "renderer/passes/light_tree.h"
-#include "renderer/passes/sample_maps.h"
+#include "renderer/passes/map/classify.h"
+#include "renderer/passes/light/light_tree.h"
+#include "renderer/passes/light/sample_maps.h"
 #include "renderer/techniques/map_params.h"
 #include <math.h>
 #include <stdio.h>

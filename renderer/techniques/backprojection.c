@@ -1,4 +1,4 @@
-#include "renderer/passes/emission_sat.h"
+#include "renderer/passes/light/emission_sat.h"
 #include "renderer/techniques/patch_params.h"
 
 struct backprojection {

@@ -1,4 +1,4 @@
-#include "renderer/passes/light_samples.h"
+#include "renderer/passes/filter/light_samples.h"
 
 struct bilateral {
     uint32_t samples;

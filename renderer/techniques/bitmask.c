@@ -1,5 +1,5 @@
-#include "renderer/passes/interleave.h"
-#include "renderer/passes/light_bits.h"
+#include "renderer/passes/filter/interleave.h"
+#include "renderer/passes/light/light_bits.h"
 #include "renderer/techniques/patch_params.h"
 
 static const char *const sample_names[] = {"64", "256", NULL};

@@ -1,6 +1,6 @@
-#include "renderer/passes/cascades.h"
-#include "renderer/passes/classify.h"
-#include "renderer/passes/sample_maps.h"
+#include "renderer/passes/light/cascades.h"
+#include "renderer/passes/map/classify.h"
+#include "renderer/passes/light/sample_maps.h"
 #include "renderer/techniques/map_params.h"
 #include <math.h>
 #include <stdio.h>

@@ -1,4 +1,4 @@
-// Filtered depth tests from the series of passes/convolution.h.
+// Filtered depth tests from the series of passes/map/convolution.h.
 #include "receiver.glsl"
 #include "window.glsl"
 

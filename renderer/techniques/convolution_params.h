@@ -1,7 +1,7 @@
 /* Rows and glue that the methods on convolution shadow maps share. */
 #pragma once
-#include "renderer/passes/classify.h"
-#include "renderer/passes/convolution.h"
+#include "renderer/passes/map/classify.h"
+#include "renderer/passes/map/convolution.h"
 #include "renderer/techniques/map_params.h"
 #include <stdio.h>
 

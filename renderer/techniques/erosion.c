@@ -1,5 +1,5 @@
-#include "renderer/passes/interleave.h"
-#include "renderer/passes/penumbra.h"
+#include "renderer/passes/filter/interleave.h"
+#include "renderer/passes/filter/penumbra.h"
 #include "renderer/techniques/map_params.h"
 #include <math.h>
 #include <string.h>

@@ -1,4 +1,4 @@
-#include "renderer/passes/passes.h"
+#include "renderer/passes/draw/passes.h"
 #include "renderer/techniques/map_params.h"
 
 struct hard {

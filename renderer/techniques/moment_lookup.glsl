@@ -1,4 +1,4 @@
-// One filtered fetch from a blurred moment map (passes/moments.c) and what to compare it with.
+// One filtered fetch from a blurred moment map (passes/map/moments.c) and what to compare it with.
 #include "depth_unit.glsl"
 #include "moments.glsl"
 layout(binding = 7) uniform sampler2D moment_map; // trilinear

@@ -1,4 +1,4 @@
-#include "renderer/passes/moments.h"
+#include "renderer/passes/map/moments.h"
 #include "renderer/techniques/map_params.h"
 
 struct msm {

@@ -1,5 +1,5 @@
-#include "renderer/passes/classify.h"
-#include "renderer/passes/sat.h"
+#include "renderer/passes/map/classify.h"
+#include "renderer/passes/map/sat.h"
 #include "renderer/techniques/map_params.h"
 
 struct mssm {

@@ -1,5 +1,5 @@
-#include "renderer/passes/passes.h"
-#include "renderer/passes/sample_maps.h"
+#include "renderer/passes/draw/passes.h"
+#include "renderer/passes/light/sample_maps.h"
 #include "renderer/techniques/map_params.h"
 #include <string.h>
 

@@ -1,7 +1,7 @@
 /* Rows of the methods that take the map's texels for casters (caster_patches.glsl). */
 #pragma once
-#include "renderer/passes/classify.h"
-#include "renderer/passes/peel.h"
+#include "renderer/passes/map/classify.h"
+#include "renderer/passes/map/peel.h"
 #include "renderer/techniques/map_params.h"
 
 #define KERNEL_ROW(aggregate)                                                                      \

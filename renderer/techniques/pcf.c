@@ -1,5 +1,5 @@
-#include "renderer/passes/classify.h"
-#include "renderer/passes/passes.h"
+#include "renderer/passes/map/classify.h"
+#include "renderer/passes/draw/passes.h"
 #include "renderer/techniques/map_params.h"
 
 struct pcf {

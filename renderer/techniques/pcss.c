@@ -1,6 +1,6 @@
-#include "renderer/passes/classify.h"
-#include "renderer/passes/interleave.h"
-#include "renderer/passes/passes.h"
+#include "renderer/passes/map/classify.h"
+#include "renderer/passes/filter/interleave.h"
+#include "renderer/passes/draw/passes.h"
 #include "renderer/techniques/map_params.h"
 
 struct pcss {

@@ -1,4 +1,4 @@
-#include "renderer/passes/rays.h"
+#include "renderer/passes/rays/rays.h"
 
 static const char *const weighting_names[] = {"area", "g", NULL};
 

@@ -1,4 +1,4 @@
-#include "renderer/passes/penumbra.h"
+#include "renderer/passes/filter/penumbra.h"
 
 struct screen_space {
     uint32_t map_size;

@@ -1,6 +1,6 @@
-#include "renderer/passes/classify.h"
-#include "renderer/passes/interleave.h"
-#include "renderer/passes/sat.h"
+#include "renderer/passes/map/classify.h"
+#include "renderer/passes/filter/interleave.h"
+#include "renderer/passes/map/sat.h"
 #include "renderer/techniques/map_params.h"
 
 static const char *const subdivide_names[] = {"quadtree", "uniform", "off", NULL};

@@ -1,6 +1,6 @@
 /* Adaptive light source subdivision: where it splits, what it converges to, both ways of counting.
  */
-#include "renderer/passes/light_tree.h"
+#include "renderer/passes/light/light_tree.h"
 #include "tests/accuracy/textured.h"
 #include "tests/unit/check.h"
 

@@ -1,6 +1,6 @@
 /* The blocks of the moment methods by themselves: the algebra of moments.glsl, run as it is on the
  * device, against distributions made by hand, and the blur. */
-#include "renderer/passes/blur.h"
+#include "renderer/passes/map/blur.h"
 #include "tests/accuracy/compute.h"
 #include "tests/unit/check.h"
 #include <math.h>

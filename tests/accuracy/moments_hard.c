@@ -1,6 +1,6 @@
 /* Prefiltered hard shadows: the step of a half-plane against the kernel's own step response, and
  * what leaks through stacked casters against its closed form. */
-#include "renderer/passes/blur.h"
+#include "renderer/passes/map/blur.h"
 #include "tests/accuracy/harness.h"
 #include "tests/unit/check.h"
 

@@ -1,5 +1,5 @@
 /* Summed-area tables against sums in double, on both paths, and what Chebyshev makes of them. */
-#include "renderer/passes/sat.h"
+#include "renderer/passes/map/sat.h"
 #include "tests/accuracy/compute.h"
 #include "tests/unit/check.h"
 #include <math.h>

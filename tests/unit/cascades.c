@@ -1,6 +1,6 @@
 /* Cascades: split positions against the closed forms, weights of the light samples, and the
  * property that no blocker of a receiver lies outside its cascade's windows. */
-#include "renderer/passes/cascades.h"
+#include "renderer/passes/light/cascades.h"
 #include "tests/unit/check.h"
 #include <cglm/cglm.h>
 

@@ -1,6 +1,6 @@
 /* The document before any vertex: containers, JSON, schema, extensions, data URIs; and that each
  * refusal comes from the check that is meant to make it. */
-#include "renderer/import/document.h"
+#include "renderer/import/document/document.h"
 #include "tests/unit/import_support.h"
 
 #define ASSET "{\"asset\":{\"version\":\"2.0\"}"

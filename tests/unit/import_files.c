@@ -1,6 +1,6 @@
 /* Uploads of several files: bundles, zips, and what a URI may name. */
 #include "renderer/import/bundle.h"
-#include "renderer/import/files.h"
+#include "renderer/import/files/files.h"
 #include "tests/unit/import_support.h"
 #include <zip.h>
 

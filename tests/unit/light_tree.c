@@ -1,5 +1,5 @@
 /* The quadtree over a light: weights, points and their pages, for random trees. */
-#include "renderer/passes/light_tree.h"
+#include "renderer/passes/light/light_tree.h"
 #include "tests/unit/check.h"
 
 static uint32_t seed = 7;

@@ -1,0 +1,372 @@
+#include "renderer/frame/frame.h"
+#include "renderer/frame/layers.h"
+#include "renderer/frame/output.h"
+#include "renderer/passes/draw/passes.h"
+#include <cglm/cglm.h>
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+/* As ViewBlock in view.glsl. */
+struct view_block {
+    mat4 world_to_clip, clip_to_world;
+    float eye[4], forward[4], viewport[4], ambient[4], background[4], ground[4], ground_albedo[4],
+        display[4];
+};
+
+/* As ShadeBlock in shade.frag. */
+struct shade_block {
+    struct {
+        float origin[4], half_x[4], half_y[4], z[4], radiance[4];
+    } lights[PEN_MAX_LIGHTS];
+};
+
+struct frame {
+    const struct frame_job *job;
+    struct view view;
+    struct light lights[PEN_MAX_LIGHTS];
+    const struct emission *emissions[PEN_MAX_LIGHTS]; /* NULL: no texture */
+    uint32_t light_count;
+    GLuint view_buffer;
+    struct pen_result *result;
+    uint64_t triangles;
+    bool classified; /* at least one light of one frame */
+    uint32_t number; /* of the jittered frame */
+    struct frame_work work;
+};
+
+static void release(GLuint *framebuffer, struct gl_texture *texture)
+{
+    if (*framebuffer)
+        gl.DeleteFramebuffers(1, framebuffer);
+    *framebuffer = 0;
+    gl_texture_destroy(texture);
+}
+
+void frame_targets_finish(struct frame_targets *t)
+{
+    struct gbuffer *g = &t->gbuffer;
+    struct gl_texture *textures[] = {&g->depth, &g->normal, &g->albedo, &g->surface, &g->emission};
+    for (int i = 0; i < 5; i++)
+        gl_texture_destroy(textures[i]);
+    if (g->framebuffer)
+        gl.DeleteFramebuffers(1, &g->framebuffer);
+    for (uint32_t i = 0; i < t->vis.layers; i++)
+        gl.DeleteFramebuffers(1, &t->vis_framebuffers[i]);
+    gl_texture_destroy(&t->vis);
+    release(&t->color_framebuffer, &t->color);
+    release(&t->beauty_framebuffer, &t->beauty_sum);
+    release(&t->vis_sum_framebuffer, &t->vis_sum);
+    release(&t->classes.framebuffer, &t->classes.sum);
+    release(&t->variance.framebuffer, &t->variance.sum);
+    memset(t, 0, sizeof *t);
+}
+
+static void fit_sum(
+    struct gl_texture *texture, GLuint *framebuffer, uint32_t width, uint32_t height)
+{
+    static const float zero[4] = {0};
+    if (gl_texture_fit(texture, GL_RGBA32F, width, height, 0, 1) || !*framebuffer) {
+        gl.DeleteFramebuffers(1, framebuffer);
+        const struct gl_texture *color = texture;
+        *framebuffer = gl_framebuffer_create(&color, 1, NULL);
+    }
+    gl.ClearNamedFramebufferfv(*framebuffer, GL_COLOR, 0, zero);
+}
+
+static void fit_targets(struct frame *f)
+{
+    struct frame_targets *t = f->job->targets;
+    const struct pen_request *r = f->job->request;
+    uint32_t layers = f->light_count ? f->light_count : 1, old = t->vis.layers;
+    frame_output_fit(t, r);
+    if (gl_texture_fit(&t->vis, GL_RGBA16F, r->width, r->height, layers, 1)) {
+        gl.DeleteFramebuffers((GLsizei)old, t->vis_framebuffers);
+        gl.CreateFramebuffers((GLsizei)layers, t->vis_framebuffers);
+        for (uint32_t i = 0; i < layers; i++)
+            gl.NamedFramebufferTextureLayer(
+                t->vis_framebuffers[i], GL_COLOR_ATTACHMENT0, t->vis.name, 0, (GLint)i);
+    }
+    if (!frame_output_is_direct(r) && frame_output_needs_beauty(r))
+        fit_sum(&t->beauty_sum, &t->beauty_framebuffer, r->width, r->height);
+    if (frame_output_needs_visibility(r))
+        fit_sum(&t->vis_sum, &t->vis_sum_framebuffer, r->width, r->height);
+}
+
+static void upload_view(struct frame *f, uint32_t number)
+{
+    const struct pen_request *r = f->job->request;
+    const struct view *v = &f->view;
+    struct view_block b = {0};
+    memcpy(b.world_to_clip, v->world_to_clip, sizeof b.world_to_clip);
+    memcpy(b.clip_to_world, v->clip_to_world, sizeof b.clip_to_world);
+    memcpy(b.eye, v->eye, 12);
+    b.eye[3] = 0.5f * (float)r->height / tanf(0.5f * v->fov_y_rad);
+    memcpy(b.forward, v->forward, 12);
+    b.forward[3] = v->near_z;
+    b.viewport[0] = (float)r->width, b.viewport[1] = (float)r->height;
+    b.viewport[2] = 1 / b.viewport[0], b.viewport[3] = 1 / b.viewport[1];
+    memcpy(b.ambient, r->ambient, 12);
+    memcpy(b.background, r->background, 12);
+    memcpy(b.ground_albedo, r->ground_albedo, 12);
+    float center[3], radius = scene_radius(f->job->scene);
+    scene_center(f->job->scene, center);
+    bool empty = scene_is_empty(f->job->scene);
+    b.ground[0] = center[0], b.ground[2] = center[2];
+    /* A hair below the bounds, so that a floor of the scene itself hides it. */
+    b.ground[1] = (empty ? 0 : f->job->scene->blob.header->bounds_min[1]) - 1e-4f * radius;
+    b.ground[3] = 12 * radius;
+    b.display[0] = exp2f(r->exposure_ev);
+    b.display[1] = (float)r->tone_map;
+    b.display[2] = (float)number;
+    b.display[3] = 1 / (float)r->antialias;
+    gl.NamedBufferData(f->view_buffer, sizeof b, &b, GL_STREAM_DRAW);
+    gl.BindBufferBase(GL_UNIFORM_BUFFER, GL_UBO_VIEW, f->view_buffer);
+}
+
+/* Point `index` of the Halton sequence in bases 2 and 3, centred on 0. */
+static void jitter(uint32_t index, float *x, float *y)
+{
+    float at[2] = {0, 0};
+    for (uint32_t k = 0; k < 2; k++) {
+        float scale = 1;
+        for (uint32_t i = index + 1; i; i /= k + 2) {
+            scale /= (float)(k + 2);
+            at[k] += scale * (float)(i % (k + 2));
+        }
+    }
+    *x = at[0] - 0.5f, *y = at[1] - 0.5f;
+}
+
+static bool resolve_emissions(struct frame *f, struct pen_error *error)
+{
+    const struct frame_job *job = f->job;
+    const struct pen_technique_info *info = &job->technique->info;
+    bool averaged = false;
+    for (uint32_t i = 0; i < f->light_count; i++) {
+        const struct pen_light *source = f->lights[i].source;
+        if (source->texture == PEN_TEXTURE_NONE)
+            continue;
+        const struct scene *image =
+            source->texture == PEN_TEXTURE_IMAGE ? job->find_image(job->owner, source) : NULL;
+        f->emissions[i] =
+            emission_cache_get(job->emissions, source, image, job->request->time_s, error);
+        if (!f->emissions[i])
+            return false;
+        for (uint32_t k = 0; k < f->lights[i].face_count; k++) {
+            f->lights[i].faces[k].textured = 1;
+            memcpy(f->lights[i].faces[k].emission_mean, f->emissions[i]->mean, 12);
+        }
+        averaged |= !info->textured;
+    }
+    if (averaged)
+        pen_result_warn(f->result,
+            "%s knows one visibility per light: textured lights shine in their mean colour.",
+            info->title);
+    return true;
+}
+
+static bool record_face(
+    struct frame *f, uint32_t light, uint32_t number, bool *counted, struct pen_error *error)
+{
+    const struct frame_job *job = f->job;
+    struct light_face *face = &f->lights[light].faces[number];
+    struct technique_ctx *ctx = job->ctx;
+    glm_mat4_mul(face->world_to_light, f->view.clip_to_world, face->clip_to_light);
+    gl.NamedBufferData(ctx->light_block, sizeof *face, face, GL_STREAM_DRAW);
+    gl.BindBufferBase(GL_UNIFORM_BUFFER, GL_UBO_LIGHT, ctx->light_block);
+    gl.BindBufferBase(GL_UNIFORM_BUFFER, GL_UBO_PARAMS, ctx->param_block);
+    const struct emission *emission = f->emissions[light];
+    struct technique_run run = {.ctx = ctx,
+        .scene = job->scene,
+        .view = &f->view,
+        .gbuffer = &job->targets->gbuffer,
+        .light = &f->lights[light],
+        .face = face,
+        .request = job->request,
+        .technique = job->technique,
+        .params = job->request->technique_params,
+        .state = job->technique_state,
+        .vis_framebuffer = job->targets->vis_framebuffers[light],
+        .emission = emission ? &emission->texture : &ctx->white,
+        .result = f->result,
+        .width = job->request->width,
+        .height = job->request->height,
+        .frame = f->number,
+        .light_index = light,
+        .variance_framebuffer = frame_layers_want_error(job->request, job->technique)
+                                    ? job->targets->variance.framebuffer
+                                    : 0};
+    if (!job->technique->record(&run, error))
+        return false;
+    *counted |= run.work_counted;
+    f->classified |= run.tiles != NULL;
+    return !frame_layers_want_classes(job->request) ||
+           frame_layers_add_classes(job, run.tiles, number == 0, error);
+}
+
+static bool record_light(struct frame *f, uint32_t light, struct pen_error *error)
+{
+    bool counted = false;
+    for (uint32_t k = 0; k < f->lights[light].face_count; k++)
+        if (!record_face(f, light, k, &counted, error))
+            return false;
+    f->work.lights[f->number] += !counted;
+    return true;
+}
+
+static bool record_visibility(struct frame *f, struct pen_error *error)
+{
+    const struct frame_job *job = f->job;
+    gl.NamedBufferData(job->ctx->param_block, sizeof job->request->technique_params,
+        job->request->technique_params, GL_STREAM_DRAW);
+    for (uint32_t i = 0; i < f->light_count; i++) {
+        gl.ClearNamedFramebufferfv(job->targets->vis_framebuffers[i], GL_COLOR, 0,
+            f->lights[i].faces[0].emission_mean); /* what an unshadowed receiver sees */
+        if (!record_light(f, i, error))
+            return false;
+    }
+    return !f->work.lights[f->number] ||
+           frame_layers_count_receivers(job, f->number, &f->work, error);
+}
+
+static void scale3(float out[4], const float v[3], float factor, float w)
+{
+    for (int i = 0; i < 3; i++)
+        out[i] = v[i] * factor;
+    out[3] = w;
+}
+
+static void make_shade_block(const struct frame *f, struct shade_block *b)
+{
+    memset(b, 0, sizeof *b);
+    for (uint32_t i = 0; i < f->light_count; i++) {
+        const struct light *l = &f->lights[i];
+        const struct light_face *face = &l->faces[0];
+        const struct pen_light *s = l->source;
+        scale3(b->lights[i].origin, l->origin, 1, (float)s->type);
+        scale3(b->lights[i].half_x, l->x, face->half[0], s->radius);
+        scale3(b->lights[i].half_y, l->y, face->half[1], cosf(glm_rad(s->inner_cone_deg)));
+        scale3(b->lights[i].z, l->z, 1, cosf(glm_rad(s->outer_cone_deg)));
+        scale3(b->lights[i].radiance, l->radiance, 1, 0);
+    }
+}
+
+static bool shade(struct frame *f, struct pen_error *error)
+{
+    const struct frame_job *job = f->job;
+    const struct frame_targets *t = job->targets;
+    bool direct = frame_output_is_direct(job->request), emission = t->gbuffer.emission.name != 0;
+    struct shade_block block;
+    make_shade_block(f, &block);
+    struct pass_texture textures[] = {{UNIT_DEPTH, t->gbuffer.depth.name, GL_SAMPLE_NEAREST},
+        {UNIT_NORMAL, t->gbuffer.normal.name, GL_SAMPLE_NEAREST},
+        {UNIT_ALBEDO, t->gbuffer.albedo.name, GL_SAMPLE_NEAREST},
+        {UNIT_SURFACE, t->gbuffer.surface.name, GL_SAMPLE_NEAREST},
+        {UNIT_FREE, t->vis.name, GL_SAMPLE_NEAREST},
+        {UNIT_EMITTED, t->gbuffer.emission.name, GL_SAMPLE_NEAREST}};
+    bool rect = false, round = false, punctual = false;
+    for (uint32_t i = 0; i < f->light_count; i++) {
+        uint32_t type = f->lights[i].source->type;
+        rect |= type == PEN_LIGHT_RECT;
+        round |= type == PEN_LIGHT_DISK || type == PEN_LIGHT_SPHERE;
+        punctual |= type >= PEN_LIGHT_SUN;
+    }
+    char defines[192];
+    snprintf(defines, sizeof defines, "#define LIGHTS %u\n%s%s%s%s%s%s", f->light_count,
+        job->scene->has_gloss ? "#define GLOSSY\n" : "", direct ? "#define RESOLVE\n" : "",
+        emission ? "#define EMIT\n" : "", rect ? "#define HAS_RECT\n" : "",
+        round ? "#define HAS_ROUND\n" : "", punctual ? "#define HAS_PUNCTUAL\n" : "");
+    return pass_fill(job->ctx,
+        &(struct pass_fill){.name = "shade",
+            .fragment = "shade.frag",
+            .defines = defines,
+            .stage = PEN_STAGE_SHADE,
+            .textures = textures,
+            .texture_count = emission ? 6 : 5,
+            .framebuffer = direct ? t->color_framebuffer : t->beauty_framebuffer,
+            .width = job->request->width,
+            .height = job->request->height,
+            .add = !direct,
+            .extra = &block,
+            .extra_bytes = sizeof block},
+        error);
+}
+
+static bool add_visibility(struct frame *f, struct pen_error *error)
+{
+    int32_t count[4] = {(int32_t)f->light_count};
+    const struct frame_targets *t = f->job->targets;
+    struct pass_texture texture = {UNIT_FREE, t->vis.name, GL_SAMPLE_NEAREST};
+    return pass_fill(f->job->ctx,
+        &(struct pass_fill){.name = "average",
+            .fragment = "average.frag",
+            .stage = PEN_STAGE_SHADE,
+            .textures = &texture,
+            .texture_count = 1,
+            .framebuffer = t->vis_sum_framebuffer,
+            .width = f->job->request->width,
+            .height = f->job->request->height,
+            .add = true,
+            .extra = count,
+            .extra_bytes = sizeof count},
+        error);
+}
+
+/* The pass list. */
+static bool render_jittered(struct frame *f, uint32_t number, struct pen_error *error)
+{
+    const struct pen_request *r = f->job->request;
+    bool beauty = frame_output_needs_beauty(r), visibility = frame_output_needs_visibility(r);
+    f->number = number;
+    upload_view(f, number);
+    return pass_gbuffer(f->job->ctx, f->job->scene, &f->view, r->ground.on,
+               &f->job->targets->gbuffer, &f->triangles, error) &&
+           (!frame_output_needs_shadows(r) || record_visibility(f, error)) &&
+           (!beauty || shade(f, error)) && (!visibility || add_visibility(f, error));
+}
+
+bool frame_render(const struct frame_job *job, struct pen_frame *frame, struct pen_result *result,
+    struct pen_error *error)
+{
+    struct frame f = {.job = job, .result = result};
+    struct pen_request *r = job->request;
+    bool ok = false;
+    memset(frame, 0, sizeof *frame);
+    gl_timer_reset(&job->ctx->timer);
+    shadow_cache_begin_frame(job->ctx->shadows);
+    if (!view_resolve(&f.view, &r->camera, job->scene, r->width, r->height, error))
+        return false;
+    f.light_count = lights_resolve(f.lights, r, job->scene, result);
+    uint32_t faces = 1;
+    for (uint32_t i = 0; i < f.light_count; i++)
+        faces += f.lights[i].face_count;
+    job->ctx->shadow_budget = job->ctx->shadow_memory / (faces > 1 ? faces - 1 : 1);
+    if (!resolve_emissions(&f, error))
+        return false;
+    fit_targets(&f);
+    frame_layers_begin(job, result);
+    gl.CreateBuffers(1, &f.view_buffer);
+    for (uint32_t i = 0; i < r->antialias; i++) {
+        float x = 0, y = 0;
+        if (r->antialias > 1) {
+            jitter(i, &x, &y);
+            view_jitter(&f.view, x, y);
+        }
+        if (!render_jittered(&f, i, error))
+            goto done;
+    }
+    if (!frame_output_read(job, &f.view, frame, error))
+        goto done;
+    frame_layers_end(job, &f.work, f.classified, result);
+    gl_timer_collect(&job->ctx->timer, result);
+    result->shadow_inputs_reused = shadow_cache_all_reused(job->ctx->shadows);
+    result->triangles_drawn = (uint32_t)f.triangles;
+    ok = true;
+done:
+    if (job->technique->finish)
+        job->technique->finish(job->ctx, job->technique_state, result);
+    gl.DeleteBuffers(1, &f.view_buffer);
+    gl.DeleteQueries(PEN_MAX_ANTIALIAS, f.work.queries);
+    return ok;
+}

@@ -1,0 +1,173 @@
+#include "renderer/frame/output.h"
+#include "renderer/frame/layers.h"
+#include "renderer/passes/draw/passes.h"
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+bool frame_output_needs_beauty(const struct pen_request *r)
+{
+    return r->output.layer == PEN_LAYER_BEAUTY || r->output.layer == PEN_LAYER_ALL;
+}
+
+bool frame_output_needs_visibility(const struct pen_request *r)
+{
+    return r->output.layer == PEN_LAYER_VISIBILITY || r->output.layer == PEN_LAYER_PENUMBRA ||
+           r->output.layer == PEN_LAYER_ALL;
+}
+
+bool frame_output_needs_shadows(const struct pen_request *r)
+{
+    return frame_output_needs_beauty(r) || frame_output_needs_visibility(r) ||
+           r->output.layer == PEN_LAYER_CLASSES || r->output.layer == PEN_LAYER_ERROR;
+}
+
+static enum pen_pixel pixel_of(const struct pen_output *output, uint32_t layer)
+{
+    /* Half floats would cut depth and position to three digits. */
+    bool metres = layer == PEN_LAYER_DEPTH || layer == PEN_LAYER_POSITION;
+    if (output->format == PEN_EXR)
+        return output->bit_depth == 32 || (metres && !output->bit_depth) ? PEN_PIXEL_RGBA32F
+                                                                         : PEN_PIXEL_RGBA16F;
+    return output->bit_depth == 16 ? PEN_PIXEL_RGBA32F : PEN_PIXEL_RGBA8;
+}
+
+bool frame_output_is_direct(const struct pen_request *r)
+{
+    return r->output.layer == PEN_LAYER_BEAUTY && r->antialias == 1 &&
+           pixel_of(&r->output, PEN_LAYER_BEAUTY) == PEN_PIXEL_RGBA8;
+}
+
+static const GLenum internal_formats[] = {GL_RGBA8, GL_RGBA16F, GL_RGBA32F};
+static const GLenum read_types[] = {GL_UNSIGNED_BYTE, GL_HALF_FLOAT, GL_FLOAT};
+static const size_t pixel_bytes[] = {4, 8, 16};
+
+static void fit_color(struct frame_targets *t, const struct pen_request *r, enum pen_pixel pixel)
+{
+    GLenum format = internal_formats[pixel];
+    if (!gl_texture_fit(&t->color, format, r->width, r->height, 0, 1) && t->color_framebuffer)
+        return;
+    gl.DeleteFramebuffers(1, &t->color_framebuffer);
+    const struct gl_texture *color = &t->color;
+    t->color_framebuffer = gl_framebuffer_create(&color, 1, NULL);
+}
+
+void frame_output_fit(struct frame_targets *t, const struct pen_request *r)
+{
+    fit_color(t, r, pixel_of(&r->output, r->output.layer));
+}
+
+struct output_block {
+    float bounds_min[4], bounds_max[4], shadings[4];
+};
+
+static void make_block(const struct frame_job *job, const struct view *view, struct output_block *b)
+{
+    float center[3], radius = scene_radius(job->scene), distance = 0;
+    scene_center(job->scene, center);
+    const struct psc_header *h = job->scene->blob.header;
+    bool empty = scene_is_empty(job->scene);
+    b->shadings[0] = (float)(job->request->light_count * job->request->antialias);
+    for (int i = 0; i < 3; i++) {
+        b->bounds_min[i] = empty ? -1 : h->bounds_min[i];
+        b->bounds_max[i] = empty ? 1 : h->bounds_max[i];
+        distance += (center[i] - view->eye[i]) * view->forward[i];
+    }
+    b->bounds_min[3] = fmaxf(distance - radius, 0);
+    b->bounds_max[3] =
+        distance + radius > b->bounds_min[3] ? distance + radius : b->bounds_min[3] + radius;
+}
+
+static bool convert(const struct frame_job *job, const struct output_block *block, uint32_t layer,
+    bool raw, struct pen_error *error)
+{
+    struct frame_targets *t = job->targets;
+    char defines[64];
+    snprintf(defines, sizeof defines, "#define LAYER %u\n%s", layer, raw ? "#define RAW\n" : "");
+    const struct gl_texture *accumulated = layer == PEN_LAYER_BEAUTY    ? &t->beauty_sum
+                                           : layer == PEN_LAYER_CLASSES ? &t->classes.sum
+                                           : layer == PEN_LAYER_ERROR   ? &t->variance.sum
+                                                                        : &t->vis_sum;
+    struct pass_texture textures[] = {{0, t->gbuffer.depth.name, GL_SAMPLE_NEAREST},
+        {1, t->gbuffer.normal.name, GL_SAMPLE_NEAREST},
+        {2, t->gbuffer.albedo.name, GL_SAMPLE_NEAREST}, {7, accumulated->name, GL_SAMPLE_NEAREST}};
+    return pass_fill(job->ctx,
+        &(struct pass_fill){.name = "output",
+            .fragment = "output.frag",
+            .defines = defines,
+            .stage = PEN_STAGE_SHADE,
+            .textures = textures,
+            .texture_count = 4,
+            .framebuffer = t->color_framebuffer,
+            .width = job->request->width,
+            .height = job->request->height,
+            .extra = block,
+            .extra_bytes = sizeof *block},
+        error);
+}
+
+static uint32_t channels_of(uint32_t layer, enum pen_pixel pixel)
+{
+    switch (layer) {
+    case PEN_LAYER_DEPTH:
+    case PEN_LAYER_PENUMBRA:
+    case PEN_LAYER_CLASSES:
+    case PEN_LAYER_ERROR:
+        return 1;
+    case PEN_LAYER_VISIBILITY:
+        return pixel == PEN_PIXEL_RGBA8 ? 3 : 4;
+    default:
+        return 3;
+    }
+}
+
+static void read_plane(
+    const struct frame_job *job, enum pen_pixel pixel, uint32_t layer, struct pen_frame *frame)
+{
+    struct pen_plane *plane = &frame->planes[frame->plane_count++];
+    snprintf(plane->name, sizeof plane->name, "%s", pen_layer_names[layer]);
+    plane->pixel = pixel;
+    plane->channels = channels_of(layer, pixel);
+    plane->data = malloc((size_t)frame->width * frame->height * pixel_bytes[pixel]);
+    if (!plane->data)
+        abort();
+    gl_timer_begin(&job->ctx->timer, PEN_STAGE_READBACK, "readback");
+    gl.BindFramebuffer(GL_FRAMEBUFFER, job->targets->color_framebuffer);
+    gl.PixelStorei(GL_PACK_ALIGNMENT, 1);
+    gl.ReadPixels(0, 0, (GLsizei)frame->width, (GLsizei)frame->height, GL_RGBA, read_types[pixel],
+        plane->data);
+    gl_timer_end(&job->ctx->timer);
+}
+
+bool frame_output_read(const struct frame_job *job, const struct view *view,
+    struct pen_frame *frame, struct pen_error *error)
+{
+    const struct pen_request *r = job->request;
+    bool raw = r->output.format == PEN_EXR;
+    struct output_block block = {0};
+    memset(frame, 0, sizeof *frame);
+    frame->width = r->width, frame->height = r->height;
+    make_block(job, view, &block);
+    for (uint32_t layer = 0; layer < PEN_LAYER_ALL; layer++) {
+        bool has = layer != PEN_LAYER_ERROR || frame_layers_want_error(r, job->technique);
+        if (r->output.layer == PEN_LAYER_ALL ? !has : r->output.layer != layer)
+            continue;
+        enum pen_pixel pixel = pixel_of(&r->output, layer);
+        if (!frame_output_is_direct(r))
+            fit_color(job->targets, r, pixel);
+        if (!frame_output_is_direct(r) && !convert(job, &block, layer, raw, error)) {
+            pen_frame_finish(frame);
+            return false;
+        }
+        read_plane(job, pixel, layer, frame);
+    }
+    return true;
+}
+
+void pen_frame_finish(struct pen_frame *frame)
+{
+    for (uint32_t i = 0; i < frame->plane_count; i++)
+        free(frame->planes[i].data);
+    memset(frame, 0, sizeof *frame);
+}

@@ -1,0 +1,16 @@
+/* The last step of a frame: layers into the pixel type of the file, and out of the GPU. */
+#pragma once
+#include "renderer/frame/frame.h"
+
+/* What the output needs to have been accumulated. */
+bool frame_output_needs_beauty(const struct pen_request *request);
+bool frame_output_needs_visibility(const struct pen_request *request);
+/* True when the method has to run at all. */
+bool frame_output_needs_shadows(const struct pen_request *request);
+/* True when one 8-bit beauty image of one frame is all that is wanted: shading then resolves. */
+bool frame_output_is_direct(const struct pen_request *request);
+
+/* Makes targets->color (and its framebuffer) fit the output. */
+void frame_output_fit(struct frame_targets *targets, const struct pen_request *request);
+bool frame_output_read(const struct frame_job *job, const struct view *view,
+    struct pen_frame *frame, struct pen_error *error);

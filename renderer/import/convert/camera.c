@@ -1,0 +1,70 @@
+#include "renderer/import/base/affine.h"
+#include "renderer/import/base/budget.h"
+#include "renderer/import/convert/context.h"
+#include <string.h>
+
+#define FAR 1e6             /* m; what requests allow, too */
+#define PARALLEL_FOV_DEG 10 /* of the perspective that stands in for an orthographic camera */
+
+void imp_name(char to[GLTF_NAME_BYTES], const char *preferred, const char *otherwise)
+{
+    const char *from = preferred[0] ? preferred : otherwise;
+    size_t n = strlen(from);
+    if (n > GLTF_NAME_BYTES - 1) {
+        n = GLTF_NAME_BYTES - 1;
+        while (n && ((unsigned char)from[n] & 0xc0) == 0x80)
+            n--; /* not within a UTF-8 sequence */
+    }
+    memset(to, 0, GLTF_NAME_BYTES);
+    for (size_t i = 0; i < n; i++)
+        to[i] = (unsigned char)from[i] < 0x20 || from[i] == 0x7f ? ' ' : from[i];
+}
+
+/* How far ahead of the eye the middle of the scene is; 1 when it is behind, or nowhere. */
+static double focus(const struct imp_context *context, const double eye[3], const double axis[3])
+{
+    double distance = 0;
+    for (int i = 0; i < 3; i++)
+        distance += ((context->bounds_min[i] + context->bounds_max[i]) / 2 - eye[i]) * axis[i];
+    return context->bounds_min[0] <= context->bounds_max[0] && distance > 1e-3 ? distance : 1;
+}
+
+void imp_add_camera(struct imp_context *context, const struct gltf_camera *camera,
+    const struct gltf_node *node, const double world[12])
+{
+    struct psc_camera to = {0};
+    double eye[3] = {world[3], world[7], world[11]}, up[3], axis[3];
+    imp_affine_axis(world, 1, 1, up);
+    double scale = imp_affine_axis(world, 2, -1, axis);
+    if (context->camera_count >= IMP_MAX_LIGHTS) {
+        imp_warn(context, "Only the first %u cameras are kept.", IMP_MAX_LIGHTS);
+        return;
+    }
+    double distance = focus(context, eye, axis), fov = camera->fov_y * 180 / M_PI;
+    if (!camera->perspective) {
+        imp_warn(context,
+            "Orthographic cameras become perspective ones of %d degrees, from farther away.",
+            PARALLEL_FOV_DEG);
+        fov = PARALLEL_FOV_DEG;
+        double back = fabs(camera->y_mag) * scale / tan(fov / 2 * M_PI / 180);
+        for (int i = 0; i < 3; i++)
+            eye[i] += axis[i] * (distance - back);
+        distance = back;
+    }
+    if (!(fov > 0))
+        fov = 45;
+    distance = fmin(fmax(distance, 1e-3), FAR);
+    for (int i = 0; i < 3; i++) {
+        if (!(fabs(eye[i]) < FAR)) {
+            imp_warn(context, "A camera farther than 1000 km from the origin is left out.");
+            return;
+        }
+        to.eye[i] = (float)eye[i];
+        to.target[i] = (float)fmin(fmax(eye[i] + axis[i] * distance, -FAR), FAR);
+        to.up[i] = (float)up[i];
+    }
+    to.fov_y_deg = (float)fmin(fmax(fov, 1), 170);
+    imp_name(to.name, node->name, camera->name);
+    psc_builder_add_camera(context->builder, &to);
+    context->camera_count++;
+}

@@ -1,0 +1,238 @@
+#include "renderer/import/convert/accessor.h"
+#include "renderer/import/base/affine.h"
+#include "renderer/import/base/budget.h"
+#include "renderer/import/convert/context.h"
+#include "renderer/import/base/memory.h"
+#include <stdio.h>
+#include <string.h>
+
+#define LARGEST 1e12 /* of a matrix element; with positions up to 1e12 m all stays finite */
+
+static bool node_fail(struct pen_error *error, enum pen_code code, uint32_t node, const char *what)
+{
+    char pointer[64];
+    snprintf(pointer, sizeof pointer, "/nodes/%u", node);
+    return pen_fail(error, code, pointer, "glTF %s: %s.", pointer, what);
+}
+
+/* Every node has at most one parent and none is its own ancestor: then the walk below ends. */
+static bool check_forest(const struct gltf_model *model, struct pen_error *error)
+{
+    uint32_t n = model->node_count;
+    uint32_t *parent = imp_alloc(n, sizeof *parent); /* plus 1; 0: none */
+    uint32_t *seen = imp_alloc(n, sizeof *seen);     /* by the climb from this node, plus 1 */
+    bool done = true;
+    for (uint32_t i = 0; done && i < n; i++)
+        for (uint32_t k = 0; done && k < model->nodes[i].child_count; k++) {
+            uint32_t child = (uint32_t)model->children[model->nodes[i].first_child + k];
+            if (child >= n || parent[child])
+                done = node_fail(error, PEN_INVALID, child, "it has more than one parent");
+            else
+                parent[child] = i + 1;
+        }
+    for (uint32_t i = 0; done && i < n; i++) {
+        uint32_t at = i + 1;
+        while (at && !seen[at - 1]) {
+            seen[at - 1] = i + 1;
+            at = parent[at - 1];
+        }
+        if (at && seen[at - 1] == i + 1)
+            done = node_fail(error, PEN_INVALID, at - 1, "it is its own ancestor");
+    }
+    for (uint32_t i = 0; i < n; i++)
+        seen[i] = 0;
+    for (uint32_t i = 0; done && i < model->root_count; i++) {
+        uint32_t root = (uint32_t)model->roots[i];
+        if (root >= n || parent[root])
+            done = node_fail(error, PEN_INVALID, root, "a scene's node has a parent");
+        else if (seen[root]++)
+            done = node_fail(error, PEN_INVALID, root, "the scene names it twice");
+    }
+    free(parent);
+    free(seen);
+    return done;
+}
+
+static void local_matrix(const struct gltf_node *node, double out[12])
+{
+    if (!node->has_matrix) {
+        imp_affine_trs(node->translation, node->rotation, node->scale, out);
+        return;
+    }
+    for (int r = 0; r < 3; r++)
+        for (int c = 0; c < 4; c++)
+            out[4 * r + c] = node->matrix[4 * c + r];
+}
+
+static void grow_bounds(
+    struct imp_context *context, const struct primitive_bounds *box, const double world[12])
+{
+    for (int corner = 0; corner < 8; corner++) {
+        double p[3], q[3];
+        for (int k = 0; k < 3; k++)
+            p[k] = corner >> k & 1 ? box->max[k] : box->min[k];
+        imp_affine_point(world, p, q);
+        for (int k = 0; k < 3; k++) {
+            context->bounds_min[k] = fmin(context->bounds_min[k], q[k]);
+            context->bounds_max[k] = fmax(context->bounds_max[k], q[k]);
+        }
+    }
+}
+
+static bool add_mesh_at(struct imp_context *context, const struct gltf_node *node, uint32_t number,
+    const double world[12], struct pen_error *error)
+{
+    const struct gltf_mesh *mesh = &context->model->meshes[node->mesh];
+    float matrix[12];
+    for (int i = 0; i < 12; i++) {
+        if (!(fabs(world[i]) <= LARGEST))
+            return node_fail(
+                error, PEN_INVALID, number, "its place or size in the world is beyond 1e12 m");
+        matrix[i] = (float)world[i];
+    }
+    if (mesh->primitive_count > IMP_MAX_INSTANCES - context->instance_count)
+        return node_fail(
+            error, PEN_TOO_BIG, number, "the scene draws too many instances of its meshes");
+    context->instance_count += mesh->primitive_count;
+    for (uint32_t i = 0; i < mesh->primitive_count; i++) {
+        uint32_t psc;
+        if (!imp_primitive(context, mesh->first_primitive + i, &psc, error))
+            return false;
+        if (psc == IMP_SKIPPED)
+            continue;
+        psc_builder_add_instance(context->builder, psc, matrix);
+        grow_bounds(context, &context->primitive_bounds[mesh->first_primitive + i], world);
+    }
+    return true;
+}
+
+/* EXT_mesh_gpu_instancing: one instance for each element of the node's TRS accessors. */
+static bool add_instances(struct imp_context *context, const struct gltf_node *node,
+    uint32_t number, const double world[12], struct pen_error *error)
+{
+    const int32_t accessors[3] = {
+        node->instance_translation, node->instance_rotation, node->instance_scale};
+    const uint32_t components[3] = {3, 4, 3};
+    struct imp_reader readers[3];
+    uint32_t count = 0;
+    for (int k = 0; k < 3; k++) {
+        if (accessors[k] < 0)
+            continue;
+        if (!imp_reader_init(&readers[k], context->document, context->model, accessors[k], error))
+            return false;
+        if (readers[k].components != components[k] || (count && readers[k].count != count))
+            return node_fail(error, PEN_INVALID, number,
+                "the accessors of EXT_mesh_gpu_instancing do not fit together");
+        count = readers[k].count;
+    }
+    if (count > IMP_MAX_INSTANCES)
+        return node_fail(
+            error, PEN_TOO_BIG, number, "the scene draws too many instances of its meshes");
+    for (uint32_t i = 0; i < count; i++) {
+        float t[3] = {0, 0, 0}, q[4] = {0, 0, 0, 1}, s[3] = {1, 1, 1};
+        float *out[3] = {t, q, s};
+        for (int k = 0; k < 3; k++)
+            if (accessors[k] >= 0)
+                imp_read_floats(&readers[k], i, out[k], components[k]);
+        double local[12], placed[12];
+        imp_affine_trs(t, q, s, local);
+        imp_affine_multiply(world, local, placed);
+        if (!add_mesh_at(context, node, number, placed, error))
+            return false;
+    }
+    return true;
+}
+
+/* Cameras wait for the bounds of everything. */
+struct waiting {
+    uint32_t node;
+    double world[12];
+};
+
+struct walk {
+    struct imp_context *context;
+    struct waiting *cameras;
+    uint32_t camera_count;
+};
+
+static bool visit(
+    struct walk *walk, uint32_t number, const double world[12], struct pen_error *error)
+{
+    struct imp_context *context = walk->context;
+    const struct gltf_model *model = context->model;
+    const struct gltf_node *node = &model->nodes[number];
+    if (node->skin >= 0)
+        imp_warn(context, "Skins are ignored: meshes are drawn at rest.");
+    if (node->mesh >= 0 && (uint32_t)node->mesh < model->mesh_count &&
+        !(node->instanced ? add_instances(context, node, number, world, error)
+                          : add_mesh_at(context, node, number, world, error)))
+        return false;
+    if (node->light >= 0 && (uint32_t)node->light < model->light_count)
+        imp_add_light(context, &model->lights[node->light], node, world);
+    if (node->area_light >= 0 && (uint32_t)node->area_light < model->area_light_count)
+        imp_add_light(context, &model->area_lights[node->area_light], node, world);
+    if (node->camera >= 0 && (uint32_t)node->camera < model->camera_count &&
+        walk->camera_count <= IMP_MAX_LIGHTS) { /* the one too many draws the warning */
+        struct waiting *camera = &walk->cameras[walk->camera_count++];
+        camera->node = number;
+        memcpy(camera->world, world, sizeof camera->world);
+    }
+    return true;
+}
+
+struct frame {
+    uint32_t node, next_child;
+    double world[12];
+};
+
+static bool walk_tree(
+    struct walk *walk, struct frame *stack, uint32_t root, struct pen_error *error)
+{
+    const struct gltf_model *model = walk->context->model;
+    uint32_t depth = 1;
+    stack[0].node = root;
+    stack[0].next_child = 0;
+    local_matrix(&model->nodes[root], stack[0].world);
+    if (!visit(walk, root, stack[0].world, error))
+        return false;
+    while (depth) {
+        struct frame *top = &stack[depth - 1];
+        const struct gltf_node *node = &model->nodes[top->node];
+        if (top->next_child == node->child_count) {
+            depth--;
+            continue;
+        }
+        uint32_t child = (uint32_t)model->children[node->first_child + top->next_child++];
+        if (depth == IMP_MAX_NODE_DEPTH)
+            return node_fail(error, PEN_TOO_BIG, child, "the node hierarchy is too deep");
+        struct frame *next = &stack[depth++];
+        double local[12];
+        next->node = child;
+        next->next_child = 0;
+        local_matrix(&model->nodes[child], local);
+        imp_affine_multiply(top->world, local, next->world);
+        if (!visit(walk, child, next->world, error))
+            return false;
+    }
+    return true;
+}
+
+bool imp_add_nodes(struct imp_context *context, struct pen_error *error)
+{
+    const struct gltf_model *model = context->model;
+    if (!check_forest(model, error))
+        return false;
+    struct walk walk = {
+        .context = context, .cameras = imp_alloc(IMP_MAX_LIGHTS + 1, sizeof *walk.cameras)};
+    struct frame *stack = imp_alloc(IMP_MAX_NODE_DEPTH, sizeof *stack);
+    bool done = true;
+    for (uint32_t i = 0; done && i < model->root_count; i++)
+        done = walk_tree(&walk, stack, (uint32_t)model->roots[i], error);
+    for (uint32_t i = 0; done && i < walk.camera_count; i++) {
+        const struct gltf_node *node = &model->nodes[walk.cameras[i].node];
+        imp_add_camera(context, &model->cameras[node->camera], node, walk.cameras[i].world);
+    }
+    free(stack);
+    free(walk.cameras);
+    return done;
+}

@@ -1,0 +1,85 @@
+#include "renderer/import/base/budget.h"
+#include "renderer/import/convert/context.h"
+#include "renderer/import/base/memory.h"
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+static uint64_t hash(const char *text) /* FNV-1a */
+{
+    uint64_t h = 0xcbf29ce484222325u;
+    for (; *text; text++)
+        h = (h ^ (uint8_t)*text) * 0x100000001b3u;
+    return h;
+}
+
+void imp_warn(struct imp_context *context, const char *format, ...)
+{
+    char text[400];
+    va_list args;
+    va_start(args, format);
+    vsnprintf(text, sizeof text, format, args);
+    va_end(args);
+    uint64_t h = hash(text);
+    for (uint32_t i = 0; i < context->warned_count; i++)
+        if (context->warned[i] == h)
+            return;
+    if (context->warned_count == IMP_MAX_WARNINGS)
+        return;
+    context->warned[context->warned_count++] = h;
+    psc_builder_add_warning(context->builder, "%s", text);
+}
+
+static uint32_t *not_yet(size_t count)
+{
+    uint32_t *numbers = imp_alloc(count, sizeof *numbers);
+    memset(numbers, 0xff, count * sizeof *numbers);
+    return numbers;
+}
+
+bool imp_convert(struct imp_document *document, struct gltf_model *model,
+    struct psc_builder *builder, struct pen_error *error)
+{
+    struct imp_context context = {.document = document,
+        .model = model,
+        .builder = builder,
+        .optimiser_work = IMP_MAX_OPTIMISER_WORK,
+        .primitives = not_yet(model->primitive_count),
+        .materials = not_yet((size_t)model->material_count + 1),
+        .textures = not_yet(2 * (size_t)model->texture_count),
+        .image_slots = imp_alloc(2 * (size_t)document->image_count, sizeof(struct imp_image_slot)),
+        .bounds_min = {INFINITY, INFINITY, INFINITY},
+        .bounds_max = {-INFINITY, -INFINITY, -INFINITY},
+        .primitive_bounds = imp_alloc(model->primitive_count, sizeof(struct primitive_bounds)),
+        .warned = imp_alloc(IMP_MAX_WARNINGS, sizeof(uint64_t))};
+    bool done = false;
+    if (model->primitive_count > IMP_MAX_PRIMITIVES) {
+        pen_fail(error, PEN_TOO_BIG, "", "The glTF has %u primitives; %u are allowed.",
+            model->primitive_count, IMP_MAX_PRIMITIVES);
+        goto fail;
+    }
+    if (model->scene_count > 1)
+        imp_warn(&context, "The glTF has %u scenes; scene %u is used.", model->scene_count,
+            model->scene);
+    if (document->animation_count) {
+        imp_warn(&context, "Animations are not played: nodes stay where the file puts them.");
+        psc_builder_set_animations(builder, document->animation_count);
+    }
+    if (!imp_primitives_fit(model, error) || !imp_add_nodes(&context, error))
+        goto fail;
+    imp_material(&context, -1); /* a blob has at least one material */
+    if (!context.instance_count)
+        imp_warn(&context, "The scene draws nothing.");
+    done = imp_add_images(&context, error);
+fail:
+    free(context.primitives);
+    free(context.materials);
+    free(context.textures);
+    free(context.image_slots);
+    free(context.primitive_bounds);
+    free(context.stamps);
+    free(context.stamped);
+    free(context.warned);
+    return done;
+}

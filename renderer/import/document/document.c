@@ -1,0 +1,249 @@
+#include "renderer/import/document/document.h"
+#include "renderer/import/base/budget.h"
+#include "renderer/import/base/memory.h"
+#include "renderer/import/document/schema.h"
+#include "renderer/import/base/text.h"
+#include <cjson/cJSON.h>
+#include <stdio.h>
+#include <string.h>
+
+#define GLB_JSON 0x4e4f534au
+#define GLB_BIN 0x004e4942u
+
+static uint32_t u32(const uint8_t *p)
+{
+    uint32_t x;
+    memcpy(&x, p, 4);
+    return x;
+}
+
+/* Finds the chunks of a .glb; bin stays empty when there is none. */
+static bool split_glb(const uint8_t *data, size_t bytes, struct imp_bytes *json,
+    struct imp_bytes *bin, struct pen_error *error)
+{
+    if (bytes < 20)
+        return pen_fail(error, PEN_INVALID, "", "The glTF binary is truncated.");
+    if (u32(data + 4) != 2)
+        return pen_fail(error, PEN_INVALID, "",
+            "The glTF binary has version %u; only version 2 can be read.", u32(data + 4));
+    size_t length = u32(data + 8);
+    if (length > bytes || length < 20)
+        return pen_fail(error, PEN_INVALID, "",
+            "The glTF binary says that it has %zu bytes, but %zu were uploaded.", length, bytes);
+    for (size_t at = 12, chunk = 0; at < length; chunk++) {
+        if (length - at < 8)
+            break; /* padding */
+        size_t chunk_bytes = u32(data + at);
+        uint32_t type = u32(data + at + 4);
+        at += 8;
+        if (chunk_bytes > length - at)
+            return pen_fail(
+                error, PEN_INVALID, "", "A chunk of the glTF binary is longer than the file.");
+        if ((chunk == 0) != (type == GLB_JSON))
+            return pen_fail(
+                error, PEN_INVALID, "", "A glTF binary must start with one JSON chunk.");
+        if (chunk == 0)
+            *json = (struct imp_bytes){data + at, chunk_bytes};
+        else if (type == GLB_BIN && !bin->data)
+            *bin = (struct imp_bytes){data + at, chunk_bytes};
+        at += chunk_bytes;
+    }
+    while (json->bytes && !json->data[json->bytes - 1])
+        json->bytes--; /* some writers pad with zeros */
+    return true;
+}
+
+static bool parse(struct imp_document *document, struct imp_bytes json, struct pen_error *error)
+{
+    const char *text = (const char *)json.data, *end = NULL;
+    if (json.bytes > IMP_MAX_JSON_BYTES)
+        return pen_fail(
+            error, PEN_TOO_BIG, "", "The glTF's JSON has more than %u bytes.", IMP_MAX_JSON_BYTES);
+    if (!imp_json_scan(text, json.bytes, error))
+        return false;
+    document->root = cJSON_ParseWithLengthOpts(text, json.bytes, &end, 0);
+    if (!document->root)
+        return pen_fail(error, PEN_INVALID, "", "The glTF's JSON cannot be parsed, near byte %zu.",
+            end ? (size_t)(end - text) : 0);
+    for (; end < text + json.bytes; end++)
+        if (!strchr(" \t\r\n", *end))
+            return pen_fail(error, PEN_INVALID, "", "The glTF's JSON is followed by something.");
+
+    const cJSON *asset = cJSON_GetObjectItemCaseSensitive(document->root, "asset");
+    const char *version = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(asset, "version"));
+    const char *least = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(asset, "minVersion"));
+    if (version && (strncmp(version, "2.", 2) || (least && strcmp(least, "2.0"))))
+        return pen_fail(error, PEN_INVALID, "/asset/version",
+            "The glTF has version %s; only 2.0 can be read.", imp_text(least ? least : version).s);
+    return imp_schema_check(document->root, error);
+}
+
+/* The bytes behind a uri: a data URI, decoded in place, or an uploaded file. */
+static bool fetch(cJSON *uri, struct imp_files *files, const char *name, const char *pointer,
+    const char **mime, struct imp_bytes *found, struct pen_error *error)
+{
+    if (strncmp(uri->valuestring, "data:", 5))
+        return imp_files_resolve(files, name, uri->valuestring, pointer, found, error);
+    if (imp_data_uri_decode(uri->valuestring, mime, found))
+        return true;
+    return pen_fail(
+        error, PEN_INVALID, pointer, "glTF %s: the data URI is damaged or not base64.", pointer);
+}
+
+static bool open_buffers(struct imp_document *document, struct imp_bytes bin,
+    struct imp_files *files, const char *name, struct pen_error *error)
+{
+    const cJSON *items = cJSON_GetObjectItemCaseSensitive(document->root, "buffers"), *item;
+    document->buffer_count = (uint32_t)cJSON_GetArraySize(items);
+    document->buffers = imp_alloc(document->buffer_count, sizeof *document->buffers);
+    uint32_t i = 0;
+    cJSON_ArrayForEach(item, items)
+    {
+        struct imp_bytes *buffer = &document->buffers[i];
+        char pointer[64];
+        snprintf(pointer, sizeof pointer, "/buffers/%u", i);
+        cJSON *uri = cJSON_GetObjectItemCaseSensitive(item, "uri");
+        const char *mime = "";
+        if (uri && !fetch(uri, files, name, pointer, &mime, buffer, error))
+            return false;
+        if (!uri && i == 0)
+            *buffer = bin;
+        size_t told = (size_t)cJSON_GetObjectItemCaseSensitive(item, "byteLength")->valuedouble;
+        if (buffer->data && told > buffer->bytes)
+            return pen_fail(error, PEN_INVALID, pointer,
+                "glTF %s: byteLength is %zu, but there are only %zu bytes.", pointer, told,
+                buffer->bytes);
+        if (buffer->data)
+            buffer->bytes = told;
+        i++;
+    }
+    return true;
+}
+
+static bool open_views(struct imp_document *document, struct pen_error *error)
+{
+    const cJSON *items = cJSON_GetObjectItemCaseSensitive(document->root, "bufferViews"), *item;
+    document->view_count = (uint32_t)cJSON_GetArraySize(items);
+    document->views = imp_alloc(document->view_count, sizeof *document->views);
+    uint32_t i = 0;
+    cJSON_ArrayForEach(item, items)
+    {
+        struct imp_view *view = &document->views[i];
+        char pointer[64];
+        snprintf(pointer, sizeof pointer, "/bufferViews/%u", i++);
+        if (cJSON_GetObjectItemCaseSensitive(
+                cJSON_GetObjectItemCaseSensitive(item, "extensions"), "EXT_meshopt_compression"))
+            continue;
+        const cJSON *offset = cJSON_GetObjectItemCaseSensitive(item, "byteOffset");
+        const cJSON *stride = cJSON_GetObjectItemCaseSensitive(item, "byteStride");
+        size_t first = offset ? (size_t)offset->valuedouble : 0;
+        size_t bytes = (size_t)cJSON_GetObjectItemCaseSensitive(item, "byteLength")->valuedouble;
+        struct imp_bytes buffer =
+            document
+                ->buffers[(size_t)cJSON_GetObjectItemCaseSensitive(item, "buffer")->valuedouble];
+        if (!buffer.data)
+            return pen_fail(error, PEN_INVALID, pointer,
+                "glTF %s: its buffer has neither a uri nor a binary chunk.", pointer);
+        if (first > buffer.bytes || bytes > buffer.bytes - first)
+            return pen_fail(error, PEN_INVALID, pointer,
+                "glTF %s: it reaches beyond its buffer of %zu bytes.", pointer, buffer.bytes);
+        *view = (struct imp_view){
+            buffer.data + first, bytes, stride ? (uint32_t)stride->valuedouble : 0};
+        if (view->stride % 4)
+            return pen_fail(error, PEN_INVALID, pointer,
+                "glTF %s: byteStride is not a multiple of 4.", pointer);
+    }
+    return imp_document_unpack_views(document, error);
+}
+
+static bool open_images(struct imp_document *document, struct imp_files *files, const char *name,
+    struct pen_error *error)
+{
+    const cJSON *items = cJSON_GetObjectItemCaseSensitive(document->root, "images"), *item;
+    document->image_count = (uint32_t)cJSON_GetArraySize(items);
+    document->images = imp_alloc(document->image_count, sizeof *document->images);
+    uint32_t i = 0;
+    cJSON_ArrayForEach(item, items)
+    {
+        struct imp_image *image = &document->images[i];
+        char pointer[64];
+        snprintf(pointer, sizeof pointer, "/images/%u", i++);
+        const char *mime = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(item, "mimeType"));
+        image->mime = mime ? mime : "";
+        cJSON *uri = cJSON_GetObjectItemCaseSensitive(item, "uri");
+        const cJSON *view = cJSON_GetObjectItemCaseSensitive(item, "bufferView");
+        if (!uri == !view)
+            return pen_fail(error, PEN_INVALID, pointer,
+                "glTF %s: it needs either a uri or a bufferView.", pointer);
+        if (uri && !fetch(uri, files, name, pointer, &image->mime, &image->data, error))
+            return false;
+        if (view) {
+            const struct imp_view *v = &document->views[(size_t)view->valuedouble];
+            image->data = (struct imp_bytes){v->data, v->bytes};
+        }
+    }
+    return true;
+}
+
+/* Leaves document->root with what the buffers and images point into, and the rest as text. */
+static void render_rest(struct imp_document *document)
+{
+    cJSON *kept = cJSON_CreateObject();
+    const char *const resolved[] = {"buffers", "images", "animations", "skins"};
+    for (size_t i = 0; i < sizeof resolved / sizeof *resolved; i++) {
+        cJSON *item = cJSON_DetachItemFromObjectCaseSensitive(document->root, resolved[i]);
+        if (item && i < 2)
+            cJSON_AddItemToObject(kept, resolved[i], item);
+        else
+            cJSON_Delete(item);
+    }
+    document->text = cJSON_PrintUnformatted(document->root);
+    if (!kept || !document->text)
+        abort();
+    document->text_bytes = strlen(document->text);
+    cJSON_Delete(document->root);
+    document->root = kept;
+}
+
+bool imp_document_open(struct imp_document *document, const uint8_t *data, size_t bytes,
+    struct imp_files *files, const char *name, struct psc_builder *builder, struct pen_error *error)
+{
+    memset(document, 0, sizeof *document);
+    struct imp_bytes json = {data, bytes}, bin = {NULL, 0};
+    if (bytes >= 4 && !memcmp(data, "glTF", 4) && !split_glb(data, bytes, &json, &bin, error))
+        return false;
+    if (!parse(document, json, error) || !imp_extensions_check(document->root, builder, error) ||
+        !open_buffers(document, bin, files, name, error) || !open_views(document, error) ||
+        !open_images(document, files, name, error))
+        goto fail;
+    document->animation_count = (uint32_t)cJSON_GetArraySize(
+        cJSON_GetObjectItemCaseSensitive(document->root, "animations"));
+    document->has_skins = cJSON_GetObjectItemCaseSensitive(document->root, "skins") != NULL;
+    render_rest(document);
+    return true;
+fail:
+    imp_document_finish(document);
+    return false;
+}
+
+void imp_document_finish(struct imp_document *document)
+{
+    cJSON_Delete(document->root);
+    free(document->buffers);
+    free(document->views);
+    free(document->images);
+    cJSON_free(document->text);
+    for (uint32_t i = 0; i < document->owned_count; i++)
+        free(document->owned[i]);
+    free(document->owned);
+    memset(document, 0, sizeof *document);
+}
+
+uint8_t *imp_document_alloc(struct imp_document *document, size_t bytes)
+{
+    uint32_t n = document->owned_count;
+    if (!(n & (n - 1))) /* full at each power of two */
+        document->owned = imp_realloc(document->owned, n ? 2 * n : 1, sizeof *document->owned);
+    document->owned[document->owned_count++] = imp_alloc(bytes, 1);
+    return document->owned[n];
+}

@@ -1,0 +1,56 @@
+/* A glTF document with everything that it points to outside of itself resolved: buffers, buffer
+ * views (EXT_meshopt_compression unpacked) and the bytes of images. What is left is plain JSON
+ * without any URI, for tinygltf. */
+#pragma once
+#include "renderer/import/files/files.h"
+
+struct cJSON;
+struct psc_builder;
+
+struct imp_view {
+    const uint8_t *data;
+    size_t bytes;
+    uint32_t stride; /* 0: tightly packed */
+};
+
+struct imp_image {
+    struct imp_bytes data;
+    const char *mime; /* "" when not told */
+};
+
+struct imp_document {
+    struct cJSON *root;
+    struct imp_bytes *buffers; /* data NULL: a fallback buffer that holds nothing */
+    struct imp_view *views;
+    struct imp_image *images;
+    uint32_t buffer_count, view_count, image_count;
+    uint32_t animation_count;
+    bool has_skins;
+    char *text; /* for tinygltf: without buffers, images, animations, skins */
+    size_t text_bytes;
+    uint8_t **owned; /* unpacked memory */
+    uint32_t owned_count;
+};
+
+/* `data` is a .glb or .gltf and must outlive *document, as must `files` (the other files of the
+ * upload; empty when there are none), in which it is called `name`. Warnings go to `builder`. On
+ * failure *document is empty. Errors: PEN_INVALID, PEN_TOO_BIG. */
+bool imp_document_open(struct imp_document *document, const uint8_t *data, size_t bytes,
+    struct imp_files *files, const char *name, struct psc_builder *builder,
+    struct pen_error *error);
+void imp_document_finish(struct imp_document *document);
+
+/* Memory that lives as long as the document. */
+uint8_t *imp_document_alloc(struct imp_document *document, size_t bytes);
+
+/* meshopt_views.c: unpacks the views that carry EXT_meshopt_compression into document->views. */
+bool imp_document_unpack_views(struct imp_document *document, struct pen_error *error);
+
+/* extensions.c: refuses required extensions that the importer lacks, by name, and warns of used
+ * ones that change the picture. */
+bool imp_extensions_check(
+    const struct cJSON *root, struct psc_builder *builder, struct pen_error *error);
+
+/* data_uri.c: decodes the base64 payload of "data:<mime>;base64,<payload>" in place; *mime is the
+ * part before ';', cut out of `uri` in place. False when `uri` is something else or damaged. */
+bool imp_data_uri_decode(char *uri, const char **mime, struct imp_bytes *payload);

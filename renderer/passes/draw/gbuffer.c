@@ -1,0 +1,76 @@
+#include "renderer/passes/draw/passes.h"
+#include <string.h>
+
+static void fit(struct gbuffer *g, uint32_t width, uint32_t height, bool emission)
+{
+    bool made = gl_texture_fit(&g->depth, GL_DEPTH_COMPONENT32F, width, height, 0, 1);
+    made |= gl_texture_fit(&g->normal, GL_RGBA16, width, height, 0, 1);
+    made |= gl_texture_fit(&g->albedo, GL_RGBA8, width, height, 0, 1);
+    made |= gl_texture_fit(&g->surface, GL_RGBA8, width, height, 0, 1);
+    if (emission)
+        made |= gl_texture_fit(&g->emission, GL_R11F_G11F_B10F, width, height, 0, 1);
+    else if (g->emission.name) {
+        gl_texture_destroy(&g->emission);
+        made = true;
+    }
+    if (!made && g->framebuffer)
+        return;
+    gl.DeleteFramebuffers(1, &g->framebuffer);
+    const struct gl_texture *colors[] = {&g->normal, &g->albedo, &g->surface, &g->emission};
+    g->framebuffer = gl_framebuffer_create(colors, emission ? 4 : 3, &g->depth);
+}
+
+static GLuint program(struct technique_ctx *ctx, const char *defines, struct pen_error *error)
+{
+    struct gl_program_desc desc = {
+        .vertex = "geometry.vert", .fragment = "gbuffer.frag", .defines = defines};
+    return gl_programs_get(ctx->programs, &desc, error);
+}
+
+static void set_matrix(GLuint program, const mat4 matrix)
+{
+    gl.ProgramUniformMatrix4fv(
+        program, gl.GetUniformLocation(program, "to_clip"), 1, GL_FALSE, (const float *)matrix);
+}
+
+bool pass_gbuffer(struct technique_ctx *ctx, struct scene *scene, const struct view *view,
+    bool ground, struct gbuffer *g, uint64_t *triangles, struct pen_error *error)
+{
+    bool emission = scene->has_emission || scene->has_unlit;
+    fit(g, view->width, view->height, emission);
+    struct scene_pass pass = {.full = true};
+    pass.opaque = program(ctx, emission ? "#define FULL\n#define EMIT\n" : "#define FULL\n", error);
+    pass.textured = program(ctx,
+        emission ? "#define FULL\n#define EMIT\n#define TEXTURED\n"
+                 : "#define FULL\n#define TEXTURED\n",
+        error);
+    GLuint flat = program(ctx,
+        emission ? "#define FULL\n#define EMIT\n#define GROUND\n"
+                 : "#define FULL\n#define GROUND\n",
+        error);
+    if (!pass.opaque || !pass.textured || !flat)
+        return false;
+    gl_timer_begin(&ctx->timer, PEN_STAGE_GBUFFER, "gbuffer");
+    set_matrix(pass.opaque, view->world_to_clip);
+    set_matrix(pass.textured, view->world_to_clip);
+    set_matrix(flat, view->world_to_clip);
+    static const float zero[4] = {0};
+    gl.BindFramebuffer(GL_FRAMEBUFFER, g->framebuffer);
+    gl.Viewport(0, 0, (GLsizei)view->width, (GLsizei)view->height);
+    gl.ClipControl(GL_UPPER_LEFT, GL_ZERO_TO_ONE);
+    gl.DepthMask(GL_TRUE);
+    gl.ClearNamedFramebufferfv(g->framebuffer, GL_DEPTH, 0, zero);
+    gl.Enable(GL_DEPTH_TEST);
+    gl.DepthFunc(GL_GREATER);
+    struct cull_view cull;
+    view_to_cull(view, &cull);
+    *triangles += scene_draw(scene, &cull, &pass);
+    if (ground) {
+        gl.UseProgram(flat);
+        gl.BindVertexArray(ctx->empty_array);
+        gl.DrawArrays(GL_TRIANGLE_STRIP, 0, 4);
+    }
+    gl.Disable(GL_DEPTH_TEST);
+    gl_timer_end(&ctx->timer);
+    return true;
+}

@@ -1,0 +1,48 @@
+/* Penumbrae on the screen: their size per pixel, and filters as wide as they are. For methods that
+ * fill the visibility of all faces of a light at once, with the last one. */
+#pragma once
+#include "renderer/passes/draw/scratch.h"
+#include "renderer/techniques/map_params.h"
+
+/* Rows that the blocker search needs, of an aggregate with these fields. */
+#define PENUMBRA_ROWS(aggregate, default_taps)                                                     \
+    PARAM(aggregate, search_taps, .def = default_taps, .min = 1, .max = 64, .specialise = 1,       \
+        .help = "Samples used to find the average blocker depth."),                                \
+        PARAM(aggregate, min_filter, .def = 1, .min = 0, .max = 16, .unit = "texel",               \
+            .help = "Least half width of the penumbra.")
+/* And those of the filters. */
+#define FILTER_ROWS(aggregate)                                                                     \
+    PARAM(aggregate, max_radius, .def = 128, .min = 1, .max = 1024, .unit = "px",                  \
+        .help = "Largest reach of the filter on the screen."),                                     \
+        PARAM(aggregate, depth_sigma, .def = 0.01, .min = 0.0001, .max = 1,                        \
+            .help = "Distance from the receiver's plane that still counts as the same surface, "   \
+                    "as a fraction of the distance to the camera."),                               \
+        PARAM(aggregate, normal_power, .def = 32, .min = 1, .max = 256,                            \
+            .help = "Sharpness of the filter's preference for equal normals.")
+
+/* Writes SCRATCH_SPREAD, RGBA16F, for this face's receivers: hard visibility, then the Gaussian of
+ * screen_spread in penumbra.glsl, px. (1, 0, 0, 0): proved to be lit, or no receiver at all; all
+ * zeros: a receiver that all of the light is behind. */
+bool pass_penumbra_spread(
+    struct technique_run *run, uint32_t map_size, float min_filter, struct pen_error *error);
+
+/* Classifies the face's tiles when the request wants that (NULL in *tiles: it does not). Umbra
+ * tiles of the scratch texture become (0, 0, 0, 0.001): dark, and nothing to filter.
+ * `margin_texels` as in pass_classify. */
+bool pass_penumbra_tiles(struct technique_run *run, const struct shadow_input *casters,
+    float margin_texels, const struct gl_texture *scratch, const struct gl_texture **tiles,
+    struct pen_error *error);
+
+enum penumbra_source { PENUMBRA_HARD, PENUMBRA_SAMPLES };
+
+/* Fills vis from SCRATCH_SPREAD's hard visibility, or from the sums of SCRATCH_LIT (SCRATCH_ALL),
+ * by a separable Gaussian of P(sigma) times the light's own. Nothing happens before the last face.
+ */
+bool pass_penumbra_gauss(
+    struct technique_run *run, enum penumbra_source source, struct pen_error *error);
+
+/* Makes SCRATCH_LIT (SCRATCH_ALL), or their successors, fit this light and start as lit pixels. */
+void pass_penumbra_start(struct technique_run *run, bool next);
+
+/* As pass_penumbra_gauss, by `levels` of an a-trous transform; levels 0: unfiltered. */
+bool pass_penumbra_atrous(struct technique_run *run, uint32_t levels, struct pen_error *error);

@@ -1,0 +1,65 @@
+#include "renderer/passes/map/blur.h"
+#include <math.h>
+#include <stdio.h>
+
+struct blur_block {
+    float step[4], weights[BLUR_MAX_RADIUS + 1];
+};
+
+void blur_weights(uint32_t radius, float weights[BLUR_MAX_RADIUS + 1])
+{
+    double raw[BLUR_MAX_RADIUS + 1], sum = 0, sigma = 0.5 * (radius + 0.5);
+    for (uint32_t i = 0; i <= radius; i++) {
+        raw[i] = exp(-0.5 * i * i / (sigma * sigma));
+        sum += i ? 2 * raw[i] : raw[i];
+    }
+    for (uint32_t i = 0; i <= BLUR_MAX_RADIUS; i++)
+        weights[i] = i <= radius ? (float)(raw[i] / sum) : 0;
+}
+
+static bool run(struct technique_ctx *ctx, const struct gl_texture *from, GLuint framebuffer,
+    uint32_t radius, int axis, struct pen_error *error)
+{
+    struct blur_block block = {0};
+    char defines[32];
+    snprintf(defines, sizeof defines, "#define RADIUS %u\n", radius);
+    block.step[axis] = 1 / (float)(axis ? from->height : from->width);
+    blur_weights(radius, block.weights);
+    struct pass_texture source = {UNIT_FREE, from->name, GL_SAMPLE_NEAREST};
+    return pass_fill(ctx,
+        &(struct pass_fill){.name = "blur",
+            .fragment = "blur.frag",
+            .defines = defines,
+            .stage = PEN_STAGE_SHADOW,
+            .textures = &source,
+            .texture_count = 1,
+            .framebuffer = framebuffer,
+            .width = from->width,
+            .height = from->height,
+            .extra = &block,
+            .extra_bytes = sizeof block},
+        error);
+}
+
+bool pass_blur(struct technique_ctx *ctx, const struct gl_texture *texture, uint32_t radius,
+    struct pen_error *error)
+{
+    bool ok = true;
+    if (radius) {
+        struct gl_texture between =
+            gl_texture_create(texture->format, texture->width, texture->height, 0, 1);
+        const struct gl_texture *targets[2] = {&between, texture};
+        GLuint framebuffers[2] = {gl_framebuffer_create(&targets[0], 1, NULL),
+            gl_framebuffer_create(&targets[1], 1, NULL)};
+        ok = run(ctx, texture, framebuffers[0], radius, 0, error) &&
+             run(ctx, &between, framebuffers[1], radius, 1, error);
+        gl.DeleteFramebuffers(2, framebuffers);
+        gl_texture_destroy(&between);
+    }
+    if (ok && texture->levels > 1) {
+        gl_timer_begin(&ctx->timer, PEN_STAGE_SHADOW, "mips");
+        gl.GenerateTextureMipmap(texture->name);
+        gl_timer_end(&ctx->timer);
+    }
+    return ok;
+}

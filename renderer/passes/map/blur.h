@@ -1,0 +1,13 @@
+/* Separable blur of a texture's level 0, in place, and the rest of its mip chain from it. */
+#pragma once
+#include "renderer/passes/draw/passes.h"
+
+#define BLUR_MAX_RADIUS 15
+
+/* Weights of distance 0 to `radius` (texels) of a symmetric kernel that sums to 1 over 2 radius + 1
+ * texels: a Gaussian whose standard deviation is half of radius + 1/2. */
+void blur_weights(uint32_t radius, float weights[BLUR_MAX_RADIUS + 1]);
+
+/* radius 0: mips only. The edge texel continues outside. Filterable float or normalised formats. */
+bool pass_blur(struct technique_ctx *ctx, const struct gl_texture *texture, uint32_t radius,
+    struct pen_error *error);

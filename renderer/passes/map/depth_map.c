@@ -1,0 +1,105 @@
+#include "renderer/passes/draw/passes.h"
+#include <cglm/cglm.h>
+#include <stdlib.h>
+#include <string.h>
+
+static GLuint program(struct technique_ctx *ctx, const char *defines, struct pen_error *error)
+{
+    struct gl_program_desc desc = {
+        .vertex = "geometry.vert", .fragment = "depth.frag", .defines = defines};
+    return gl_programs_get(ctx->programs, &desc, error);
+}
+
+/* layer_before: a depth texture that the drawn surfaces must lie behind, or 0. */
+static bool draw(struct technique_run *run, GLuint framebuffer, uint32_t size,
+    const float sample[2], const float rect[4], bool backdrops, GLuint layer_before,
+    struct pen_error *error)
+{
+    /* Light space looks along +z, which mirrors the image: front faces come out clockwise. */
+    struct scene_pass pass = {.front_is_clockwise = true};
+    pass.opaque = program(run->ctx, layer_before ? "#define PEEL\n" : NULL, error);
+    pass.textured = program(
+        run->ctx, layer_before ? "#define PEEL\n#define ALPHA\n" : "#define ALPHA\n", error);
+    if (!pass.opaque || !pass.textured)
+        return false;
+    struct cull_view cull;
+    light_face_cull(run->face, sample, rect, &cull);
+    if (layer_before) {
+        /* Behind the first layer the far sides count too: they close the casters. */
+        cull.cull_back = false;
+        gl.BindTextureUnit(UNIT_FREE, layer_before);
+    }
+    GLuint programs[] = {pass.opaque, pass.textured};
+    for (int i = 0; i < 2; i++)
+        gl.ProgramUniformMatrix4fv(programs[i], gl.GetUniformLocation(programs[i], "to_clip"), 1,
+            GL_FALSE, (const float *)cull.world_to_clip);
+    /* Maps that are averaged cut blended surfaces at different thresholds. */
+    uint32_t seed;
+    float mixed = sample[0] * 7919.0f + sample[1] * 104729.0f;
+    memcpy(&seed, &mixed, 4);
+    gl.ProgramUniform1ui(pass.textured, gl.GetUniformLocation(pass.textured, "seed"), seed);
+    static const float one[4] = {1};
+    gl.BindFramebuffer(GL_FRAMEBUFFER, framebuffer);
+    gl.Viewport(0, 0, (GLsizei)size, (GLsizei)size);
+    gl.ClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
+    gl.DepthMask(GL_TRUE);
+    gl.ClearNamedFramebufferfv(framebuffer, GL_DEPTH, 0, one);
+    gl.Enable(GL_DEPTH_TEST);
+    gl.DepthFunc(GL_LESS);
+    gl.Enable(GL_DEPTH_CLAMP); /* casters nearer than the near plane still cast */
+    bool *hidden = NULL;
+    if (!backdrops) {
+        hidden = calloc(run->scene->blob.instance_count + 1, sizeof *hidden);
+        if (!hidden)
+            abort();
+        light_find_backdrops(run->light, run->scene, hidden);
+        pass.hidden = hidden;
+    }
+    scene_draw(run->scene, &cull, &pass);
+    free(hidden);
+    gl.Disable(GL_DEPTH_CLAMP);
+    gl.Disable(GL_DEPTH_TEST);
+    gl.ClipControl(GL_UPPER_LEFT, GL_ZERO_TO_ONE);
+    return true;
+}
+
+bool pass_draw_casters(struct technique_run *run, GLuint framebuffer, uint32_t size,
+    const float sample[2], const float rect[4], bool backdrops, struct pen_error *error)
+{
+    return draw(run, framebuffer, size, sample, rect, backdrops, 0, error);
+}
+
+bool pass_draw_casters_behind(struct technique_run *run, GLuint framebuffer, uint32_t size,
+    GLuint layer_before, struct pen_error *error)
+{
+    static const float center[2] = {0, 0};
+    return draw(run, framebuffer, size, center, run->face->rect, false, layer_before, error);
+}
+
+static bool build_depth(struct technique_run *run, const struct shadow_key *key,
+    struct shadow_input *input, struct pen_error *error)
+{
+    static const float center[2] = {0, 0};
+    gl_timer_begin(&run->ctx->timer, PEN_STAGE_SHADOW, "shadow map");
+    input->textures[0] = gl_texture_create(GL_DEPTH_COMPONENT32F, key->size, key->size, 0, 1);
+    GLuint framebuffer = gl_framebuffer_create(NULL, 0, &input->textures[0]);
+    bool ok = pass_draw_casters(
+        run, framebuffer, key->size, center, run->face->rect, key->extra[0] == 0, error);
+    gl.DeleteFramebuffers(1, &framebuffer);
+    gl_timer_end(&run->ctx->timer);
+    return ok;
+}
+
+const struct shadow_input *pass_depth_map(
+    struct technique_run *run, uint32_t size, struct pen_error *error)
+{
+    struct shadow_key key = {.kind = "depth", .size = size};
+    return shadow_cache_get(run, &key, build_depth, error);
+}
+
+const struct shadow_input *pass_caster_map(
+    struct technique_run *run, uint32_t size, struct pen_error *error)
+{
+    struct shadow_key key = {.kind = "depth", .size = size, .extra = {1}};
+    return shadow_cache_get(run, &key, build_depth, error);
+}

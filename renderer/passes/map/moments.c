@@ -1,0 +1,58 @@
+#include "renderer/passes/map/moments.h"
+#include "renderer/passes/map/blur.h"
+#include "renderer/passes/map/classify.h"
+#include <string.h>
+
+enum { KEY_KIND, KEY_BLUR, KEY_EXPONENTS };
+
+static bool build(struct technique_run *run, const struct shadow_key *key,
+    struct shadow_input *input, struct pen_error *error)
+{
+    static const GLenum formats[] = {GL_RG32F, GL_RGBA32F, GL_RGBA32F, GL_RGBA16};
+    static const char *const defines[] = {
+        "#define VARIANCE\n", "#define EXPONENTIAL\n", NULL, NULL};
+    uint32_t kind = key->extra[KEY_KIND], margin = key->extra[KEY_BLUR] + 2;
+    uint32_t side = key->size + 2 * margin;
+    const struct shadow_input *depth = pass_depth_map(run, key->size, error);
+    if (!depth)
+        return false;
+    struct gl_texture *map = &input->textures[0];
+    *map = gl_texture_create(formats[kind], side, side, 0, 0);
+    GLuint framebuffer = gl_framebuffer_create(&(const struct gl_texture *){map}, 1, NULL);
+    float exponents[4] = {0, 0, (float)margin};
+    memcpy(exponents, &key->extra[KEY_EXPONENTS], 8);
+    struct pass_texture source = {UNIT_FREE, depth->textures[0].name, GL_SAMPLE_NEAREST};
+    bool ok = pass_fill(run->ctx,
+        &(struct pass_fill){.name = "moments",
+            .fragment = "moments.frag",
+            .defines = defines[kind],
+            .stage = PEN_STAGE_SHADOW,
+            .textures = &source,
+            .texture_count = 1,
+            .framebuffer = framebuffer,
+            .width = side,
+            .height = side,
+            .extra = exponents,
+            .extra_bytes = sizeof exponents},
+        error);
+    gl.DeleteFramebuffers(1, &framebuffer);
+    return ok && pass_blur(run->ctx, map, key->extra[KEY_BLUR], error);
+}
+
+const struct shadow_input *pass_moments(
+    struct technique_run *run, const struct moment_map *map, struct pen_error *error)
+{
+    struct shadow_key key = {.kind = "moments", .size = map->size};
+    key.extra[KEY_KIND] = map->kind;
+    key.extra[KEY_BLUR] = map->blur;
+    memcpy(&key.extra[KEY_EXPONENTS], map->exponents, sizeof map->exponents);
+    return shadow_cache_get(run, &key, build, error);
+}
+
+bool pass_moment_tiles(struct technique_run *run, const struct moment_map *map,
+    const struct gl_texture **tiles, struct pen_error *error)
+{
+    /* The kernel, and one and a half texels of the coarser level, which are at most twice as large
+     * as the pixel. */
+    return pass_lit_tiles(run, map->size, (float)map->blur + 1.5f, 3, tiles, error);
+}

@@ -1,0 +1,148 @@
+#include "renderer/passes/map/shadow_cache.h"
+#include <stdlib.h>
+#include <string.h>
+
+/* What of a face changes a shadow input: everything but the view and the emission. */
+struct face_key {
+    mat4 world_to_light;
+    float rect[4], half[2], range[2], cone;
+    int32_t shape, parallel, cube;
+};
+
+struct entry {
+    struct entry *next;
+    const struct scene *scene;
+    struct face_key face;
+    struct shadow_key key;
+    struct shadow_input input;
+    uint64_t bytes, last_frame;
+};
+
+struct shadow_cache {
+    struct entry *entries; /* most recently made first; a handful, so a list will do */
+    uint64_t bytes, frame;
+    uint32_t built;
+};
+
+struct shadow_cache *shadow_cache_create(void)
+{
+    struct shadow_cache *cache = calloc(1, sizeof *cache);
+    if (!cache)
+        abort();
+    return cache;
+}
+
+static void free_entry(struct shadow_cache *cache, struct entry *e)
+{
+    for (int i = 0; i < SHADOW_INPUT_TEXTURES; i++)
+        gl_texture_destroy(&e->input.textures[i]);
+    cache->bytes -= e->bytes;
+    free(e);
+}
+
+void shadow_cache_destroy(struct shadow_cache *cache)
+{
+    if (!cache)
+        return;
+    while (cache->entries) {
+        struct entry *e = cache->entries;
+        cache->entries = e->next;
+        free_entry(cache, e);
+    }
+    free(cache);
+}
+
+static void make_face_key(const struct light_face *face, struct face_key *key)
+{
+    memset(key, 0, sizeof *key);
+    memcpy(key->world_to_light, face->world_to_light, sizeof key->world_to_light);
+    memcpy(key->rect, face->rect, sizeof key->rect);
+    memcpy(key->half, face->half, sizeof key->half);
+    key->range[0] = face->near_z, key->range[1] = face->far_z;
+    key->cone = face->cone_cos;
+    key->shape = face->shape, key->parallel = face->parallel, key->cube = face->cube;
+}
+
+const struct shadow_input *shadow_cache_get(struct technique_run *run, const struct shadow_key *key,
+    shadow_build build, struct pen_error *error)
+{
+    struct shadow_cache *cache = run->ctx->shadows;
+    struct face_key face;
+    make_face_key(run->face, &face);
+    for (struct entry *e = cache->entries; e; e = e->next)
+        if (e->scene == run->scene && e->key.size == key->size && !strcmp(e->key.kind, key->kind) &&
+            !memcmp(e->key.extra, key->extra, sizeof key->extra) &&
+            !memcmp(&e->face, &face, sizeof face)) {
+            e->last_frame = cache->frame;
+            return &e->input;
+        }
+    struct entry *e = calloc(1, sizeof *e);
+    if (!e)
+        abort();
+    e->scene = run->scene;
+    e->face = face;
+    e->key = *key;
+    e->last_frame = cache->frame;
+    bool ok = build(run, key, &e->input, error);
+    for (int i = 0; i < SHADOW_INPUT_TEXTURES; i++)
+        e->bytes += e->input.textures[i].bytes;
+    cache->bytes += e->bytes;
+    if (!ok) {
+        free_entry(cache, e);
+        return NULL;
+    }
+    cache->built++;
+    e->next = cache->entries;
+    cache->entries = e;
+    return &e->input;
+}
+
+void shadow_cache_mark_built(struct shadow_cache *cache)
+{
+    cache->built++;
+}
+
+uint64_t shadow_cache_bytes(const struct shadow_cache *cache)
+{
+    return cache->bytes;
+}
+
+void shadow_cache_trim(struct shadow_cache *cache, uint64_t bytes)
+{
+    while (cache->bytes > bytes) {
+        struct entry **oldest = NULL;
+        for (struct entry **at = &cache->entries; *at; at = &(*at)->next)
+            if ((*at)->last_frame < cache->frame &&
+                (!oldest || (*at)->last_frame <= (*oldest)->last_frame))
+                oldest = at;
+        if (!oldest)
+            return;
+        struct entry *e = *oldest;
+        *oldest = e->next;
+        free_entry(cache, e);
+    }
+}
+
+void shadow_cache_drop_scene(struct shadow_cache *cache, const struct scene *scene)
+{
+    for (struct entry **at = &cache->entries; *at;) {
+        struct entry *e = *at;
+        if (e->scene != scene) {
+            at = &e->next;
+            continue;
+        }
+        *at = e->next;
+        free_entry(cache, e);
+    }
+}
+
+void shadow_cache_begin_frame(struct shadow_cache *cache)
+{
+    cache->frame++;
+    cache->built = 0;
+}
+
+bool shadow_cache_all_reused(const struct shadow_cache *cache)
+{
+    return cache->built == 0;
+}

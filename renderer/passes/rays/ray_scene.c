@@ -1,0 +1,109 @@
+#include "renderer/passes/rays/ray_scene.h"
+#include "renderer/passes/rays/ray_alpha.h"
+#include <math.h>
+#include <stdlib.h>
+
+static void destroy(void *data)
+{
+    struct ray_scene *s = data;
+    GLuint buffers[] = {s->nodes, s->triangles, s->alpha_triangles, s->alpha_words};
+    gl.DeleteBuffers(sizeof buffers / sizeof *buffers, buffers);
+    free(s);
+}
+
+static GLuint upload(const void *data, uint64_t bytes)
+{
+    GLuint name;
+    gl.CreateBuffers(1, &name);
+    gl.NamedBufferStorage(name, bytes ? (GLsizeiptr)bytes : 16, bytes ? data : NULL, 0);
+    return name;
+}
+
+static float extent_of(const struct pen_bvh *bvh)
+{
+    float extent = 0;
+    for (int c = 0; c < 3 && bvh->triangle_count; c++)
+        extent = fmaxf(extent, fmaxf(fabsf(bvh->nodes[0].low[c]), fabsf(bvh->nodes[0].high[c])));
+    return extent;
+}
+
+static bool upload_all(struct technique_run *run, const struct pen_bvh *bvh,
+    const struct ray_alpha *alpha, uint64_t max_block, struct pen_error *error)
+{
+    struct scene *scene = run->scene;
+    uint64_t nodes = (uint64_t)bvh->node_count * sizeof *bvh->nodes;
+    uint64_t triangles = (uint64_t)bvh->triangle_count * sizeof *bvh->triangles;
+    uint64_t records = (uint64_t)alpha->triangle_count * sizeof *alpha->triangles;
+    uint64_t bytes = nodes + triangles + records + 4 * alpha->word_count;
+    if (nodes > max_block || scene->bytes + bytes > run->ctx->gpu_memory)
+        return pen_fail(error, PEN_TOO_BIG, "/scene",
+            "Ray tracing the scene needs %.0f MiB of GPU memory beside its %.0f MiB; %.0f MiB are "
+            "allowed.",
+            (double)bytes / (1 << 20), (double)scene->bytes / (1 << 20),
+            (double)run->ctx->gpu_memory / (1 << 20));
+    struct ray_scene *s = calloc(1, sizeof *s);
+    if (!s)
+        abort();
+    s->nodes = upload(bvh->nodes, nodes);
+    s->triangles = upload(bvh->triangles, triangles);
+    if (records) {
+        s->alpha_triangles = upload(alpha->triangles, records);
+        s->alpha_words = upload(alpha->words, 4 * alpha->word_count);
+    }
+    s->node_count = bvh->triangle_count ? bvh->node_count : 0;
+    s->extent = extent_of(bvh);
+    scene->rays = s;
+    scene->rays_free = destroy;
+    scene->bytes += bytes;
+    return true;
+}
+
+/* No hierarchy over more triangles can fit: a leaf holds PEN_BVH_LEAF at most, and a tree has
+ * almost two nodes for each leaf. At least 1. */
+static uint64_t most_triangles(const struct technique_run *run, uint64_t max_block)
+{
+    uint64_t have = run->ctx->gpu_memory, used = run->scene->bytes;
+    uint64_t each =
+        sizeof(struct pen_bvh_triangle) + 2 * sizeof(struct pen_bvh_node) / PEN_BVH_LEAF;
+    uint64_t room = have > used ? (have - used) / each : 0;
+    uint64_t most = max_block / sizeof(struct pen_bvh_triangle);
+    most = room < most ? room : most;
+    return most ? most : 1;
+}
+
+static bool build(struct technique_run *run, struct pen_error *error)
+{
+    GLint64 max_block = 0;
+    gl.GetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &max_block);
+    uint64_t limit = (uint64_t)max_block;
+    struct pen_bvh bvh;
+    struct ray_alpha alpha = {0};
+    bool ok = pen_bvh_build_scene(&run->scene->blob, most_triangles(run, limit), &bvh, error) &&
+              ray_alpha_make(&run->scene->blob, &bvh, limit, &alpha, error) &&
+              upload_all(run, &bvh, &alpha, limit, error);
+    ray_alpha_finish(&alpha);
+    pen_bvh_finish(&bvh);
+    return ok;
+}
+
+const struct ray_scene *ray_scene_get(struct technique_run *run, struct pen_error *error)
+{
+    if (!run->scene->rays) {
+        gl_timer_begin(&run->ctx->timer, PEN_STAGE_SHADOW, "ray hierarchy");
+        bool ok = build(run, error);
+        gl_timer_end(&run->ctx->timer);
+        if (!ok)
+            return NULL;
+    }
+    return run->scene->rays;
+}
+
+void ray_scene_bind(const struct ray_scene *s)
+{
+    gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, s->nodes);
+    gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 1, s->triangles);
+    if (s->alpha_triangles) {
+        gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 6, s->alpha_triangles);
+        gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 7, s->alpha_words);
+    }
+}

@@ -1,0 +1,40 @@
+/* Shadow rays from every receiver of the G-buffer to one light: on the CPU by renderer/trace, or on
+ * the device by compute shaders. Both take the same samples under the same rules (trace.h). */
+#pragma once
+#include "renderer/passes/draw/passes.h"
+#include "renderer/trace/trace.h"
+
+/* Ray origins are lifted by this times the distance to the eye: what a depth buffer rounds. */
+#define RAY_DEPTH_ERROR 0x1p-16f
+
+struct ray_job {
+    uint32_t samples;   /* per receiver, at most; rounded up to a power of two */
+    float target_error; /* stop when the standard error is below; 0: all samples */
+    uint32_t weighting; /* enum pen_trace_weighting */
+    bool adaptive;      /* all samples only near receivers whose pre-test is mixed */
+    uint32_t seed;
+};
+
+/* What a light's rays leave, and room to work in; kept between frames. Zero to start. */
+struct ray_targets {
+    struct gl_texture visibility;     /* RGBA32F: rgb mean of e V, a mean of V */
+    struct gl_texture standard_error; /* R32F, of a */
+    struct gl_texture receivers[2];   /* RGBA32F: world position, geometric normal; 0: none */
+    GLuint receivers_framebuffer;
+    struct gl_texture verdicts, spread;        /* of the device */
+    GLuint points, state, list, counters, job; /* of the device: buffers */
+};
+void ray_targets_finish(struct ray_targets *targets);
+
+/* The light of run->face in the tracer's terms, without its emission. */
+struct pen_trace_light ray_light(const struct technique_run *run);
+/* Fills targets->receivers from the G-buffer. */
+bool ray_receivers(struct technique_run *run, struct ray_targets *targets, struct pen_error *error);
+
+/* Fill targets->visibility and standard_error, and count rays and receivers into run->result. */
+#ifdef PENUMBRA_HAVE_TRACE
+bool pass_rays_host(struct technique_run *run, const struct ray_job *job,
+    struct ray_targets *targets, struct pen_error *error);
+#endif
+bool pass_rays_device(struct technique_run *run, const struct ray_job *job,
+    struct ray_targets *targets, struct pen_error *error);

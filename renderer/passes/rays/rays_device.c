@@ -1,0 +1,305 @@
+/* Rays in compute shaders. Work is cut into short dispatches, each flushed on its own, so that no
+ * driver's watchdog takes a long job for a hang. */
+#include "renderer/passes/rays/ray_scene.h"
+#include "renderer/passes/rays/rays.h"
+#include "renderer/trace/points.h"
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define TILE 8u                      /* local_size of the shaders over pixels */
+#define GROUP 64u                    /* and of the one over the list */
+#define RAYS_PER_DISPATCH (1u << 21) /* milliseconds on a GPU */
+#define RECEIVERS_PER_DISPATCH (1u << 17)
+#define POINTS_PER_DISPATCH (1u << 12) /* one invocation takes them one after the other */
+#define POINTS_ON_SOFTWARE 16u /* leaves 4096 turns of llvmpipe's loops for a ray: ray_bvh.glsl */
+#define STATE_BYTES 32u        /* struct RaySums */
+
+enum { BUFFER_POINTS = 2, BUFFER_STATE, BUFFER_LIST, BUFFER_COUNTERS };
+enum { IMAGE_VISIBILITY, IMAGE_ERROR, IMAGE_MARKS };
+enum { UNIT_VERDICTS = UNIT_FREE + 2, UNIT_SPREAD };
+
+/* As RayBlock of ray_job.glsl. */
+struct ray_block {
+    float origin[4], a[4], b[4], z[4], mean[4], eye[4], bias[4];
+    uint32_t net[4], pretest[4], size[4];
+};
+
+/* As RayCounters. */
+struct ray_counters {
+    uint32_t rays_low, rays_high, full_pixels, list_count, cut;
+};
+
+struct work {
+    struct technique_run *run;
+    const struct ray_job *job;
+    struct ray_targets *targets;
+    const struct ray_scene *scene;
+    struct pen_trace_light light;
+    struct trace_points points;
+    uint32_t samples, listed;
+    bool pretest;
+    char defines[512];
+};
+
+static void make_defines(struct work *w)
+{
+    bool point = w->light.type == PEN_TRACE_POINT, textured = w->run->face->textured;
+    bool weights = w->job->weighting == PEN_TRACE_G && !point;
+    snprintf(w->defines, sizeof w->defines,
+        "#define LIGHT_TYPE %u\n#define PRETEST_NET %uu\n#define PRETEST_RIM %uu\n"
+        "#define DILATION %u\n%s%s%s%s%s",
+        w->light.type, TRACE_PRETEST_NET, TRACE_PRETEST_RIM, TRACE_DILATION,
+        w->scene->alpha_triangles ? "#define ALPHA\n" : "", textured ? "#define COLOUR\n" : "",
+        weights ? "#define WEIGHTS\n" : "", w->pretest ? "" : "#define EVERY\n",
+        weights && textured ? "#define LIT_NEEDS_SUM\n" : "");
+}
+
+static GLuint program(const struct work *w, const char *file, struct pen_error *error)
+{
+    struct gl_program_desc desc = {.compute = file, .defines = w->defines};
+    GLuint name = gl_programs_get(w->run->ctx->programs, &desc, error);
+    if (name)
+        gl.UseProgram(name);
+    return name;
+}
+
+static void dispatch(uint32_t x, uint32_t y)
+{
+    gl.DispatchCompute(x, y, 1);
+    gl.MemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_SHADER_IMAGE_ACCESS_BARRIER_BIT |
+                     GL_TEXTURE_FETCH_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
+    gl.Flush();
+}
+
+static uint32_t groups(uint32_t items, uint32_t size)
+{
+    return (items + size - 1) / size;
+}
+
+static void fill_block(const struct work *w, struct ray_block *b)
+{
+    const struct pen_trace_light *l = &w->light;
+    const struct trace_points *p = &w->points;
+    bool point = l->type == PEN_TRACE_POINT;
+    float half[2] = {l->half[0], l->half[l->type == PEN_TRACE_RECT]};
+    uint32_t seed = w->job->seed;
+    *b = (struct ray_block){.net = {trace_hash(seed), p->low_bits, p->salt, p->samples},
+        .pretest = {trace_hash(~seed), p->pretest_low_bits, p->pretest.salt},
+        .size = {w->run->width, w->run->height, w->scene->node_count}};
+    for (int c = 0; c < 3; c++) {
+        b->origin[c] = l->origin[c];
+        b->a[c] = point ? 0 : half[0] * l->x[c];
+        b->b[c] = point ? 0 : half[1] * l->y[c];
+        b->z[c] = l->z[c];
+        b->mean[c] = w->run->face->textured ? w->run->face->emission_mean[c] : 1;
+        b->eye[c] = w->run->view->eye[c];
+    }
+    b->origin[3] = l->cos_cone;
+    b->eye[3] = RAY_DEPTH_ERROR;
+    b->bias[0] = 0x1p-20f * w->scene->extent; /* rounding of coordinates, as on the CPU */
+    b->bias[1] = w->job->target_error;
+}
+
+static void fill_buffer(GLuint *name, GLsizeiptr bytes, const void *data)
+{
+    if (!*name)
+        gl.CreateBuffers(1, name);
+    gl.NamedBufferData(*name, bytes, data, GL_STREAM_DRAW);
+}
+
+static bool upload_points(struct work *w, struct pen_error *error)
+{
+    const struct trace_points *p = &w->points;
+    int32_t(*pairs)[2] = malloc(p->total * sizeof *pairs);
+    if (!pairs)
+        return pen_fail(error, PEN_INTERNAL, "", "Out of memory.");
+    for (uint32_t i = 0; i < p->total; i++) {
+        pairs[i][0] = p->u[i];
+        pairs[i][1] = p->v[i];
+    }
+    fill_buffer(&w->targets->points, (GLsizeiptr)(p->total * sizeof *pairs), pairs);
+    free(pairs);
+    return true;
+}
+
+static bool prepare(struct work *w, struct pen_error *error)
+{
+    struct ray_targets *t = w->targets;
+    uint32_t width = w->run->width, height = w->run->height;
+    struct ray_block block;
+    bool round = w->light.type != PEN_TRACE_RECT;
+    if (!trace_points_make(
+            &w->points, w->samples, w->job->target_error > 0, round, w->job->seed, error) ||
+        !upload_points(w, error))
+        return false;
+    gl_texture_fit(&t->visibility, GL_RGBA32F, width, height, 0, 1);
+    gl_texture_fit(&t->standard_error, GL_R32F, width, height, 0, 1);
+    gl_texture_fit(&t->verdicts, GL_R8UI, width, height, 0, 1);
+    gl_texture_fit(&t->spread, GL_R8UI, width, height, 0, 1);
+    fill_block(w, &block);
+    fill_buffer(&t->job, sizeof block, &block);
+    fill_buffer(&t->list, (GLsizeiptr)4 * width * height, NULL);
+    fill_buffer(&t->counters, sizeof(struct ray_counters), &(struct ray_counters){0});
+    fill_buffer(&t->state, (GLsizeiptr)STATE_BYTES * RECEIVERS_PER_DISPATCH, NULL);
+    return true;
+}
+
+static void bind_image(GLuint unit, const struct gl_texture *texture)
+{
+    gl.BindImageTexture(unit, texture->name, 0, GL_FALSE, 0, GL_WRITE_ONLY, texture->format);
+}
+
+static void bind(const struct work *w)
+{
+    const struct ray_targets *t = w->targets;
+    ray_scene_bind(w->scene);
+    gl.BindBufferBase(GL_UNIFORM_BUFFER, GL_UBO_EXTRA, t->job);
+    gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, BUFFER_POINTS, t->points);
+    gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, BUFFER_STATE, t->state);
+    gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, BUFFER_LIST, t->list);
+    gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, BUFFER_COUNTERS, t->counters);
+    bind_image(IMAGE_VISIBILITY, &t->visibility);
+    bind_image(IMAGE_ERROR, &t->standard_error);
+    gl.BindTextureUnit(UNIT_FREE, t->receivers[0].name);
+    gl.BindTextureUnit(UNIT_FREE + 1, t->receivers[1].name);
+    gl.BindTextureUnit(UNIT_VERDICTS, t->verdicts.name);
+    gl.BindTextureUnit(UNIT_SPREAD, t->spread.name);
+    gl.BindTextureUnit(UNIT_EMISSION, w->run->emission->name);
+    for (GLuint unit = UNIT_FREE; unit <= UNIT_SPREAD; unit++)
+        gl.BindSampler(unit, 0);
+    gl.BindSampler(UNIT_EMISSION, w->run->ctx->samplers.names[GL_SAMPLE_LINEAR]);
+}
+
+/* A few rays for all, in bands of rows. */
+static bool pretest(struct work *w, struct pen_error *error)
+{
+    uint32_t height = w->run->height, columns = groups(w->run->width, TILE);
+    uint32_t row_rays = columns * TILE * TILE * (TRACE_PRETEST_NET + TRACE_PRETEST_RIM);
+    uint32_t rows = row_rays < RAYS_PER_DISPATCH ? RAYS_PER_DISPATCH / row_rays : 1;
+    GLuint name = program(w, "ray_pretest.comp", error);
+    if (!name)
+        return false;
+    GLint first_row = gl.GetUniformLocation(name, "first_row");
+    bind_image(IMAGE_MARKS, &w->targets->verdicts);
+    for (uint32_t y = 0; y < height; y += rows * TILE) {
+        uint32_t left = groups(height - y, TILE);
+        gl.ProgramUniform1ui(name, first_row, y);
+        dispatch(columns, left < rows ? left : rows);
+    }
+    if (!program(w, "ray_spread.comp", error))
+        return false;
+    bind_image(IMAGE_MARKS, &w->targets->spread);
+    dispatch(columns, groups(height, TILE));
+    return true;
+}
+
+static struct ray_counters read_counters(const struct work *w)
+{
+    struct ray_counters counters;
+    gl.GetNamedBufferSubData(w->targets->counters, 0, sizeof counters, &counters);
+    return counters;
+}
+
+/* Lists who gets all samples; settles the others. */
+static bool select_receivers(struct work *w, struct pen_error *error)
+{
+    if (!program(w, "ray_select.comp", error))
+        return false;
+    dispatch(groups(w->run->width, TILE), groups(w->run->height, TILE));
+    w->listed = read_counters(w).list_count;
+    return true;
+}
+
+/* All samples of the listed receivers from `first`, slice by slice of at most `most` points. Slices
+ * hold whole pairs. */
+static void sample_range(const struct work *w, GLuint name, uint32_t first, uint32_t most)
+{
+    const struct trace_points *p = &w->points;
+    GLint range = gl.GetUniformLocation(name, "range"), ends = gl.GetUniformLocation(name, "ends");
+    uint32_t left = w->listed - first, step = 2, point = 0;
+    uint32_t count = left < RECEIVERS_PER_DISPATCH ? left : RECEIVERS_PER_DISPATCH;
+    while (step * 2 <= most && step * 2 <= RAYS_PER_DISPATCH / count)
+        step *= 2;
+    for (uint32_t b = 0; b < p->block_count; b++) {
+        uint32_t end = point + p->blocks[b].count;
+        for (; point < end; point += step) {
+            uint32_t points = end - point < step ? end - point : step;
+            bool last = point + points == end;
+            gl.ProgramUniform4ui(name, range, first, count, point, points);
+            gl.ProgramUniform1ui(name, ends, !last ? 0u : b + 1 == p->block_count ? 2u : 1u);
+            dispatch(groups(count, GROUP), 1);
+        }
+        point = end;
+    }
+}
+
+static bool sample(struct work *w, struct pen_error *error)
+{
+    GLuint name = program(w, "ray_samples.comp", error);
+    if (!name)
+        return false;
+    uint32_t most = w->run->ctx->device.software ? POINTS_ON_SOFTWARE : POINTS_PER_DISPATCH;
+    for (; most >= 2; most /= 2) {
+        static const uint32_t zero;
+        gl.NamedBufferSubData(
+            w->targets->counters, offsetof(struct ray_counters, cut), sizeof zero, &zero);
+        for (uint32_t first = 0; first < w->listed; first += RECEIVERS_PER_DISPATCH)
+            sample_range(w, name, first, most);
+        if (!read_counters(w).cut)
+            return true;
+    }
+    return pen_fail(
+        error, PEN_TOO_BIG, "/scene", "This device cuts short what it takes to trace the scene.");
+}
+
+static void add_counts(const struct work *w)
+{
+    struct ray_counters counters = read_counters(w);
+    w->run->result->rays += (uint64_t)counters.rays_high << 32 | counters.rays_low;
+    w->run->result->full_work_pixels += counters.full_pixels;
+}
+
+static void unbind(void)
+{
+    for (GLuint unit = UNIT_FREE; unit <= UNIT_SPREAD; unit++)
+        gl.BindTextureUnit(unit, 0);
+    gl.BindSampler(UNIT_EMISSION, 0);
+}
+
+static const struct step {
+    const char *name;
+    bool (*run)(struct work *, struct pen_error *);
+} steps[] = {{"ray pre-test", pretest}, {"ray select", select_receivers}, {"ray samples", sample}};
+
+static bool run_step(struct work *w, const struct step *step, struct pen_error *error)
+{
+    gl_timer_begin(&w->run->ctx->timer, PEN_STAGE_TECHNIQUE, step->name);
+    bool ok = step->run(w, error);
+    gl_timer_end(&w->run->ctx->timer);
+    return ok;
+}
+
+bool pass_rays_device(struct technique_run *run, const struct ray_job *job,
+    struct ray_targets *targets, struct pen_error *error)
+{
+    struct work w = {.run = run, .job = job, .targets = targets, .light = ray_light(run)};
+    w.scene = ray_scene_get(run, error);
+    if (!w.scene || !ray_receivers(run, targets, error))
+        return false;
+    w.samples = w.light.type == PEN_TRACE_POINT ? 1 : trace_points_round(job->samples);
+    w.pretest = job->adaptive && w.samples > TRACE_PRETEST_NET + TRACE_PRETEST_RIM;
+    make_defines(&w);
+    bool ok = prepare(&w, error);
+    if (ok) {
+        bind(&w);
+        for (size_t i = w.pretest ? 0 : 1; ok && i < sizeof steps / sizeof *steps; i++)
+            ok = run_step(&w, &steps[i], error);
+        unbind();
+    }
+    if (ok)
+        add_counts(&w);
+    trace_points_finish(&w.points);
+    return ok;
+}

@@ -1,0 +1,104 @@
+/* Rays on the CPU: read the receivers back, trace, upload. */
+#include "renderer/passes/rays/rays.h"
+#include <stdlib.h>
+#include <string.h>
+
+static void free_trace(void *trace)
+{
+    pen_trace_scene_destroy(trace);
+}
+
+static struct pen_trace_scene *trace_scene(struct scene *scene, struct pen_error *error)
+{
+    if (!scene->trace) {
+        scene->trace = pen_trace_scene_create(&scene->blob, NULL, error);
+        scene->trace_free = free_trace;
+    }
+    return scene->trace;
+}
+
+static void *room(size_t bytes)
+{
+    void *data = malloc(bytes);
+    if (!data)
+        abort();
+    return data;
+}
+
+/* The emission texture as floats; freed by the caller. */
+static float *read_emission(const struct technique_run *run, struct pen_trace_light *light)
+{
+    if (!run->face->textured)
+        return NULL;
+    size_t bytes = (size_t)run->emission->width * run->emission->height * 16;
+    float *texels = room(bytes);
+    gl.GetTextureImage(run->emission->name, 0, GL_RGBA, GL_FLOAT, (GLsizei)bytes, texels);
+    light->emission = texels;
+    light->columns = run->emission->width, light->rows = run->emission->height;
+    light->bilinear = true;
+    return texels;
+}
+
+static void read_texture(const struct gl_texture *texture, float *to)
+{
+    GLsizei bytes = (GLsizei)(16 * texture->width * texture->height);
+    gl.PixelStorei(GL_PACK_ALIGNMENT, 1);
+    gl.GetTextureImage(texture->name, 0, GL_RGBA, GL_FLOAT, bytes, to);
+}
+
+static void write_texture(const struct technique_run *run, struct gl_texture *texture,
+    GLenum format, GLenum layout, const float *from)
+{
+    gl_texture_fit(texture, format, run->width, run->height, 0, 1);
+    gl.TextureSubImage2D(
+        texture->name, 0, 0, 0, (GLsizei)run->width, (GLsizei)run->height, layout, GL_FLOAT, from);
+}
+
+bool pass_rays_host(struct technique_run *run, const struct ray_job *job, struct ray_targets *t,
+    struct pen_error *error)
+{
+    struct pen_trace_scene *scene = trace_scene(run->scene, error);
+    if (!scene || !ray_receivers(run, t, error))
+        return false;
+    size_t count = (size_t)run->width * run->height;
+    float *positions = room(16 * count), *normals = room(16 * count);
+    float *visibility = room(16 * count), *standard_error = room(4 * count);
+    struct pen_trace_light light = ray_light(run);
+    float *emission = read_emission(run, &light);
+    struct pen_trace_job trace = {.positions = positions,
+        .normals = normals,
+        .position_stride = 4,
+        .normal_stride = 4,
+        .width = run->width,
+        .height = run->height,
+        .samples = job->samples,
+        .target_error = job->target_error,
+        .weighting = job->weighting,
+        .adaptive = job->adaptive,
+        .depth_error = RAY_DEPTH_ERROR,
+        .seed = job->seed};
+    memcpy(trace.eye, run->view->eye, sizeof trace.eye);
+    bool wants_error = run->variance_framebuffer != 0;
+    struct pen_trace_result result = {
+        .visibility = visibility, .standard_error = wants_error ? standard_error : NULL};
+    struct pen_trace_stats stats;
+    read_texture(&t->receivers[0], positions);
+    read_texture(&t->receivers[1], normals);
+    gl_timer_begin(&run->ctx->timer, PEN_STAGE_TECHNIQUE, "trace");
+    bool ok = pen_trace_visibility(scene, &light, &trace, &result, &stats, error);
+    gl_timer_end(&run->ctx->timer);
+    if (ok) {
+        write_texture(run, &t->visibility, GL_RGBA32F, GL_RGBA, visibility);
+        gl_texture_fit(&t->standard_error, GL_R32F, run->width, run->height, 0, 1);
+        if (wants_error)
+            write_texture(run, &t->standard_error, GL_R32F, GL_RED, standard_error);
+        run->result->rays += stats.rays;
+        run->result->full_work_pixels += (uint32_t)stats.full_receivers;
+    }
+    free(positions);
+    free(normals);
+    free(visibility);
+    free(standard_error);
+    free(emission);
+    return ok;
+}

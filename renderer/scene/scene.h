@@ -1,0 +1,73 @@
+/* A scene in GPU memory, and the drawing of it. */
+#pragma once
+#include "renderer/blob/pscene.h"
+#include "renderer/scene/cull.h"
+#include "renderer/gl/program.h"
+#include "renderer/gl/texture.h"
+
+/* Draws that share state. What differs per draw (matrix, material) rides on instance attributes. */
+struct scene_group {
+    uint32_t first, count; /* of scene->order */
+    uint32_t material;     /* whose textures are bound; UINT32_MAX: none needed */
+    bool double_sided, mirrored;
+    bool alpha; /* MASK or BLEND: fragments may be discarded */
+};
+
+struct scene {
+    uint8_t id[PEN_ID_BYTES];
+    struct psc_scene blob; /* stays mapped: culling and tracing read it */
+    GLuint positions, attributes, indices, instances, materials, commands;
+    GLuint depth_array, full_array; /* vertex arrays: positions only; everything */
+    struct gl_texture *images;
+    GLuint *samplers; /* one per blob texture */
+    uint32_t *order;  /* instances sorted by state */
+    struct scene_group *groups;
+    uint32_t group_count;
+    struct cull_command *command_room;
+    float content[2][3]; /* world bounds without a flat floor that everything stands on */
+    bool has_emission, has_unlit;
+    bool has_gloss; /* some roughness is below 0.5 */
+    uint64_t bytes;
+    uint64_t last_use;
+    void *trace; /* owned by the tracer when there is one; freed through trace_free */
+    void (*trace_free)(void *);
+    void *rays; /* of passes/rays/ray_scene.c, in GPU memory; freed through rays_free */
+    void (*rays_free)(void *);
+};
+
+/* Uploads the blob behind `fd`. Errors as psc_open; PEN_INTERNAL out of GPU memory. */
+struct scene *scene_create(const uint8_t id[PEN_ID_BYTES], int fd, struct pen_error *error);
+/* From memory that outlives the scene. */
+struct scene *scene_create_memory(
+    const uint8_t id[PEN_ID_BYTES], const void *data, size_t bytes, struct pen_error *error);
+void scene_destroy(struct scene *scene);
+
+bool scene_is_empty(const struct scene *scene);
+/* Of the sphere around the content, m; >= 1e-4. Cameras and lights are chosen to suit it: a floor
+ * may be any size. */
+float scene_radius(const struct scene *scene);
+void scene_center(const struct scene *scene, float center[3]);
+/* World bounds of one instance: of its primitive's box, transformed. */
+void scene_instance_bounds(
+    const struct scene *scene, uint32_t instance, float min[3], float max[3]);
+
+/* The two programs of a geometry pass: `opaque` without texture access, `textured` for groups that
+ * need it (alpha tests, and all textured materials when `full`). */
+struct scene_pass {
+    GLuint opaque, textured;
+    bool full; /* draws with all attributes and textures; else positions only where it can */
+    bool front_is_clockwise; /* the target's y axis is flipped */
+    const bool *hidden;      /* instances to leave out, or NULL */
+};
+/* Returns the triangles drawn. The caller has bound framebuffer, viewport and depth state. */
+uint64_t scene_draw(
+    struct scene *scene, const struct cull_view *view, const struct scene_pass *pass);
+
+/* Texture units of the geometry passes. */
+enum {
+    SCENE_UNIT_BASE,
+    SCENE_UNIT_SURFACE,
+    SCENE_UNIT_NORMAL,
+    SCENE_UNIT_OCCLUSION,
+    SCENE_UNIT_EMISSION
+};

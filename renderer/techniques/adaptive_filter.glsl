@@ -1,6 +1,6 @@
 // Filtered visibility of one page's samples where samples disagree: rgb = w e V, a = w V.
 #include "sample_maps.glsl"
-#include "tree_bits.glsl"
+#include "adaptive_bits.glsl"
 layout(binding = 10) uniform sampler2DArray maps;
 layout(std140, binding = 3) uniform FilterBlock {
     SampleMap samples[16];

@@ -1,6 +1,6 @@
 // Sum over the leaves' corners. Where all samples agree it is 1 or 0 without looking.
 #include "sample_maps.glsl"
-#include "tree_bits.glsl"
+#include "adaptive_bits.glsl"
 layout(binding = 10) uniform sampler2D filtered; // of adaptive_filter.glsl
 layout(std140, binding = 3) uniform ResolveBlock {
     SampleMap samples[289]; // layer.w: page * 16 + bit

@@ -212,7 +212,7 @@ static bool count_pass(
     gl.ColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_FALSE);
     bool ok = pass_fill(run->ctx,
         &(struct pass_fill){.name = "light counts",
-            .fragment = "light_count.frag",
+            .fragment = "adaptive_count.frag",
             .defines = query ? "#define QUERY\n" : NULL,
             .stage = PEN_STAGE_TECHNIQUE,
             .textures = textures,

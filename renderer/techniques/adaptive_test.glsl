@@ -1,7 +1,7 @@
 // Tests the new samples of one page. The result is added to the page's bits.
 #include "sample_maps.glsl"
 #include "min_max.glsl"
-#include "tree_bits.glsl"
+#include "adaptive_bits.glsl"
 layout(binding = 10) uniform sampler2DArray maps;
 layout(std140, binding = 3) uniform TestBlock {
     SampleMap samples[16];

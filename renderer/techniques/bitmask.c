@@ -51,7 +51,7 @@ static bool sample_emission(
         {UNIT_EMISSION, run->emission->name, GL_SAMPLE_TRILINEAR}};
     return pass_fill(run->ctx,
         &(struct pass_fill){.name = "emission of the points",
-            .fragment = "light_bits_emission.frag",
+            .fragment = "bitmask_emission.frag",
             .stage = PEN_STAGE_TECHNIQUE,
             .textures = textures,
             .texture_count = 2,

@@ -113,7 +113,7 @@ static bool read_tiles(
     struct pass_texture depth = {UNIT_DEPTH, run->gbuffer->depth.name, GL_SAMPLE_NEAREST};
     if (!pass_fill(run->ctx,
             &(struct pass_fill){.name = "depth tiles",
-                .fragment = "depth_tiles.frag",
+                .fragment = "cascaded_tiles.frag",
                 .stage = PEN_STAGE_TECHNIQUE,
                 .textures = &depth,
                 .texture_count = 1,

@@ -4,7 +4,8 @@ import subprocess
 import sys
 
 ROOT = os.path.realpath(os.path.join(os.path.dirname(__file__), "..", ".."))
-CODE = (".c", ".h", ".cpp", ".glsl", ".def", ".py", ".sh", ".js", ".html", ".css", ".cmake")
+GLSL = (".glsl", ".vert", ".frag", ".comp")
+CODE = GLSL + (".c", ".h", ".cpp", ".def", ".py", ".sh", ".js", ".html", ".css", ".cmake")
 IGNORED_FOLDERS = {".git", "build", "out", "demo-out", "node_modules", "__pycache__"}
 
 

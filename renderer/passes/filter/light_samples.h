@@ -1,5 +1,5 @@
 /* Light samples with a shadow map each, looked up per pixel and left in scratch textures for a
- * filter (shaders/light_ratio.glsl). */
+ * filter (light_ratio.glsl). */
 #pragma once
 #include "renderer/passes/filter/penumbra.h"
 #include "renderer/passes/light/sample_maps.h"

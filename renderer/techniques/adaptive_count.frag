@@ -1,6 +1,6 @@
 // Counts, per quad of the light's tree, the pixels whose samples at its corners disagree: into
 // counters, or by the fragments that remain (QUERY: one quad a pass).
-#include "tree_bits.glsl"
+#include "adaptive_bits.glsl"
 layout(std140, binding = 3) uniform CountBlock {
     ivec4 count;       // x: quads, y: pages, z: 1: every pixel counts that something may shadow
     uvec4 corners[64]; // page * 16 + bit

@@ -1,4 +1,4 @@
-#include "renderer/import/base/affine.h"
+#include "renderer/blob/affine.h"
 #include "renderer/import/base/budget.h"
 #include "renderer/import/convert/context.h"
 #include <string.h>
@@ -34,8 +34,8 @@ void imp_add_camera(struct imp_context *context, const struct gltf_camera *camer
 {
     struct psc_camera to = {0};
     double eye[3] = {world[3], world[7], world[11]}, up[3], axis[3];
-    imp_affine_axis(world, 1, 1, up);
-    double scale = imp_affine_axis(world, 2, -1, axis);
+    psc_affine_axis(world, 1, 1, up);
+    double scale = psc_affine_axis(world, 2, -1, axis);
     if (context->camera_count >= IMP_MAX_LIGHTS) {
         imp_warn(context, "Only the first %u cameras are kept.", IMP_MAX_LIGHTS);
         return;

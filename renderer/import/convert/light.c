@@ -1,7 +1,7 @@
 /* KHR_lights_punctual and EXT_lights_area. Both are photometric (cd, lux, nits); the renderer is
  * radiometric. 683 lm/W, the efficacy that defines the lumen, converts between them: it is what
  * Blender's exporter multiplies by, so a 100 W lamp comes back as 100 W. */
-#include "renderer/import/base/affine.h"
+#include "renderer/blob/affine.h"
 #include "renderer/import/base/budget.h"
 #include "renderer/import/convert/context.h"
 #include "renderer/import/base/text.h"
@@ -70,9 +70,9 @@ void imp_add_light(struct imp_context *context, const struct gltf_light *light,
 {
     struct psc_light to = {0};
     double x[3], up[3], axis[3];
-    double scale = imp_affine_axis(world, 0, 1, x);
-    scale = fmax(scale, imp_affine_axis(world, 1, 1, up));
-    scale = fmax(scale, imp_affine_axis(world, 2, -1, axis));
+    double scale = psc_affine_axis(world, 0, 1, x);
+    scale = fmax(scale, psc_affine_axis(world, 1, 1, up));
+    scale = fmax(scale, psc_affine_axis(world, 2, -1, axis));
     double position[3] = {world[3], world[7], world[11]};
     if (context->light_count >= IMP_MAX_LIGHTS) {
         imp_warn(context, "Only the first %u lights are kept.", IMP_MAX_LIGHTS);

@@ -1,5 +1,5 @@
 #include "renderer/import/convert/accessor.h"
-#include "renderer/import/base/affine.h"
+#include "renderer/blob/affine.h"
 #include "renderer/import/base/budget.h"
 #include "renderer/import/convert/context.h"
 #include "renderer/import/base/memory.h"
@@ -56,7 +56,7 @@ static bool check_forest(const struct gltf_model *model, struct pen_error *error
 static void local_matrix(const struct gltf_node *node, double out[12])
 {
     if (!node->has_matrix) {
-        imp_affine_trs(node->translation, node->rotation, node->scale, out);
+        psc_affine_trs(node->translation, node->rotation, node->scale, out);
         return;
     }
     for (int r = 0; r < 3; r++)
@@ -71,7 +71,7 @@ static void grow_bounds(
         double p[3], q[3];
         for (int k = 0; k < 3; k++)
             p[k] = corner >> k & 1 ? box->max[k] : box->min[k];
-        imp_affine_point(world, p, q);
+        psc_affine_point(world, p, q);
         for (int k = 0; k < 3; k++) {
             context->bounds_min[k] = fmin(context->bounds_min[k], q[k]);
             context->bounds_max[k] = fmax(context->bounds_max[k], q[k]);
@@ -135,8 +135,8 @@ static bool add_instances(struct imp_context *context, const struct gltf_node *n
             if (accessors[k] >= 0)
                 imp_read_floats(&readers[k], i, out[k], components[k]);
         double local[12], placed[12];
-        imp_affine_trs(t, q, s, local);
-        imp_affine_multiply(world, local, placed);
+        psc_affine_trs(t, q, s, local);
+        psc_affine_multiply(world, local, placed);
         if (!add_mesh_at(context, node, number, placed, error))
             return false;
     }
@@ -210,7 +210,7 @@ static bool walk_tree(
         next->node = child;
         next->next_child = 0;
         local_matrix(&model->nodes[child], local);
-        imp_affine_multiply(top->world, local, next->world);
+        psc_affine_multiply(top->world, local, next->world);
         if (!visit(walk, child, next->world, error))
             return false;
     }

@@ -2,7 +2,7 @@
 #pragma once
 #include <math.h>
 
-static inline void imp_affine_multiply(const double a[12], const double b[12], double out[12])
+static inline void psc_affine_multiply(const double a[12], const double b[12], double out[12])
 {
     for (int r = 0; r < 3; r++)
         for (int c = 0; c < 4; c++)
@@ -11,7 +11,7 @@ static inline void imp_affine_multiply(const double a[12], const double b[12], d
 }
 
 /* T R S; the quaternion (x, y, z, w) need not be of unit length, zero is no rotation. */
-static inline void imp_affine_trs(
+static inline void psc_affine_trs(
     const float t[3], const float q[4], const float s[3], double out[12])
 {
     double x = q[0], y = q[1], z = q[2], w = q[3];
@@ -27,7 +27,7 @@ static inline void imp_affine_trs(
     }
 }
 
-static inline void imp_affine_point(const double m[12], const double p[3], double out[3])
+static inline void psc_affine_point(const double m[12], const double p[3], double out[3])
 {
     for (int r = 0; r < 3; r++)
         out[r] = m[4 * r] * p[0] + m[4 * r + 1] * p[1] + m[4 * r + 2] * p[2] + m[4 * r + 3];
@@ -35,7 +35,7 @@ static inline void imp_affine_point(const double m[12], const double p[3], doubl
 
 /* Column `axis` times `sign`, of unit length; returns the column's length (0: *out is that axis of
  * the world). */
-static inline double imp_affine_axis(const double m[12], int axis, double sign, double out[3])
+static inline double psc_affine_axis(const double m[12], int axis, double sign, double out[3])
 {
     double v[3] = {m[axis], m[4 + axis], m[8 + axis]};
     double length = sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);

@@ -1,4 +1,5 @@
 #include "protocol/json_writer.h"
+#include "protocol/memory.h"
 #include "protocol/request.h"
 #include <assert.h>
 #include <math.h>
@@ -8,15 +9,7 @@
 
 static void put(struct pen_json *json, const char *text, size_t bytes)
 {
-    if (json->size + bytes + 1 > json->capacity) {
-        size_t capacity = json->capacity ? json->capacity : 1024;
-        while (capacity < json->size + bytes + 1)
-            capacity *= 2;
-        json->text = realloc(json->text, capacity);
-        if (!json->text)
-            abort();
-        json->capacity = capacity;
-    }
+    json->text = pen_grow(json->text, &json->capacity, json->size + bytes + 1, 1);
     memcpy(json->text + json->size, text, bytes);
     json->size += bytes;
     json->text[json->size] = 0;

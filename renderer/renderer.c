@@ -1,4 +1,5 @@
 #include "renderer/renderer.h"
+#include "protocol/memory.h"
 #include "renderer/frame/frame.h"
 #include "renderer/generate/generate.h"
 #include "renderer/gl/context.h"
@@ -54,9 +55,7 @@ const struct pen_catalogue *pen_renderer_catalogue(void)
 struct pen_renderer *pen_renderer_create(
     const struct pen_renderer_config *config, struct pen_error *error)
 {
-    struct pen_renderer *r = calloc(1, sizeof *r);
-    if (!r)
-        abort();
+    struct pen_renderer *r = pen_alloc_zero(1, sizeof *r);
     r->context = gl_context_create(config, &r->ctx.device, error);
     if (!r->context) {
         free(r);

@@ -1,4 +1,5 @@
 #include "server/auth.h"
+#include "protocol/memory.h"
 #include "server/hash.h"
 #include <errno.h>
 #include <openssl/crypto.h>
@@ -23,9 +24,7 @@ static void digest_of(const char *token, uint8_t digest[PEN_ID_BYTES])
 
 struct auth *auth_load(const char *path, struct pen_error *error)
 {
-    struct auth *auth = calloc(1, sizeof *auth);
-    if (!auth)
-        abort();
+    struct auth *auth = pen_alloc_zero(1, sizeof *auth);
     char line[1024];
     FILE *file = fopen(path, "re");
     if (!file) {
@@ -42,9 +41,7 @@ struct auth *auth_load(const char *path, struct pen_error *error)
             pen_fail(error, PEN_INVALID, "", "A token has fewer than %d characters.", MIN_TOKEN);
             goto fail;
         }
-        auth->digests = realloc(auth->digests, (auth->count + 1) * sizeof *auth->digests);
-        if (!auth->digests)
-            abort();
+        auth->digests = pen_realloc_array(auth->digests, auth->count + 1, sizeof *auth->digests);
         digest_of(token, auth->digests[auth->count++]);
     }
     if (!auth->count) {

@@ -1,4 +1,5 @@
 #include "server/auto_history.h"
+#include "protocol/memory.h"
 #include "server/clock.h"
 #include "server/hash.h"
 #include <pthread.h>
@@ -21,9 +22,7 @@ struct auto_history {
 
 struct auto_history *auto_history_create(void)
 {
-    struct auto_history *history = calloc(1, sizeof *history);
-    if (!history)
-        abort();
+    struct auto_history *history = pen_alloc_zero(1, sizeof *history);
     pthread_mutex_init(&history->lock, NULL);
     return history;
 }

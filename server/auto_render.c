@@ -1,4 +1,5 @@
 #include "server/auto_render.h"
+#include "protocol/memory.h"
 #include "server/auto_history.h"
 #include "server/calibration.h"
 #include "server/clock.h"
@@ -46,9 +47,7 @@ struct auto_runs {
 
 struct auto_runs *auto_runs_create(void)
 {
-    struct auto_runs *runs = calloc(1, sizeof *runs);
-    if (!runs)
-        abort();
+    struct auto_runs *runs = pen_alloc_zero(1, sizeof *runs);
     pthread_mutex_init(&runs->lock, NULL);
     pthread_mutex_init(&runs->saving, NULL);
     runs->history = auto_history_create();
@@ -365,9 +364,7 @@ static void wait_for_run(
     struct service *s = call->service;
     struct auto_runs *runs = s->auto_runs;
     struct pen_error error = {0};
-    struct run *fresh = calloc(1, sizeof *fresh);
-    if (!fresh)
-        abort();
+    struct run *fresh = pen_alloc_zero(1, sizeof *fresh);
     call->is_deferred = true;
     http_defer(call->exchange);
     pthread_mutex_lock(&runs->lock);

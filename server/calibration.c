@@ -1,5 +1,6 @@
 #include "server/calibration.h"
 #include "protocol/json_writer.h"
+#include "protocol/memory.h"
 #include "server/hash.h"
 #include "server/picture.h"
 #include <cjson/cJSON.h>
@@ -137,11 +138,9 @@ static void read_all(int folder, const struct pen_device_info *device, struct ca
 bool calibration_load(struct scene_store *store, const uint8_t scene[PEN_ID_BYTES],
     const struct pen_device_info *device, bool any, struct auto_table *table)
 {
-    struct calibration *all = malloc(sizeof *all);
+    struct calibration *all = pen_alloc(1, sizeof *all);
     const struct auto_table *found = NULL;
     int folder = open_folder(store, scene);
-    if (!all)
-        abort();
     all->count = 0;
     if (folder >= 0) {
         read_all(folder, device, all);
@@ -198,12 +197,10 @@ bool calibration_save(struct scene_store *store, const uint8_t scene[PEN_ID_BYTE
     const struct pen_device_info *device, const struct auto_table *table)
 {
     static const char part[] = "calibration.part";
-    struct calibration *all = malloc(sizeof *all);
+    struct calibration *all = pen_alloc(1, sizeof *all);
     char name[48], *content = NULL;
     int folder = open_folder(store, scene), fd = -1;
     bool ok = false;
-    if (!all)
-        abort();
     if (folder < 0)
         goto done;
     read_all(folder, device, all);

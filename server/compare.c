@@ -1,4 +1,5 @@
 #include "server/compare.h"
+#include "protocol/memory.h"
 #include "server/channel.h"
 #include "server/clock.h"
 #include <fcntl.h>
@@ -81,10 +82,8 @@ static void finish(struct waiter *waiter, const struct outcome *outcome)
 bool compare_start(struct scheduler *scheduler, const struct compare_plan *plan,
     uint32_t *retry_after_s, struct pen_error *error)
 {
-    struct compare *c = calloc(1, sizeof *c);
-    struct compare_row *rows = calloc(plan->count, sizeof *rows);
-    if (!c || !rows)
-        abort();
+    struct compare *c = pen_alloc_zero(1, sizeof *c);
+    struct compare_row *rows = pen_alloc_zero(plan->count, sizeof *rows);
     c->scheduler = scheduler;
     c->plan = *plan;
     c->rows = rows;

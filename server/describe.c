@@ -1,5 +1,6 @@
 #include "server/describe.h"
 #include "protocol/json_result.h"
+#include "protocol/memory.h"
 #include "renderer/blob/pscene.h"
 #include <stdio.h>
 #include <stdlib.h>
@@ -45,10 +46,8 @@ static char *describe_scene(
     memcpy(info.id, id, PEN_ID_BYTES);
     memcpy(info.bounds_min, scene->header->bounds_min, sizeof info.bounds_min);
     memcpy(info.bounds_max, scene->header->bounds_max, sizeof info.bounds_max);
-    struct pen_scene_camera *cameras = calloc(scene->camera_count + 1, sizeof *cameras);
-    struct pen_scene_light *lights = calloc(scene->light_count + 1, sizeof *lights);
-    if (!cameras || !lights)
-        abort();
+    struct pen_scene_camera *cameras = pen_alloc_zero(scene->camera_count + 1, sizeof *cameras);
+    struct pen_scene_light *lights = pen_alloc_zero(scene->light_count + 1, sizeof *lights);
     for (uint32_t i = 0; i < scene->camera_count; i++) {
         const struct psc_camera *from = &scene->cameras[i];
         memcpy(cameras[i].eye, from->eye, sizeof from->eye);

@@ -1,4 +1,5 @@
 #include "server/door.h"
+#include "protocol/memory.h"
 #include "server/clock.h"
 #include "server/log.h"
 #include <arpa/inet.h>
@@ -85,9 +86,7 @@ static const char *admit(struct door *door, int fd, const struct sockaddr_storag
         return "429 Too Many Requests";
     if (fd >= door->capacity) {
         int capacity = fd * 2 + 64;
-        door->entries = realloc(door->entries, (size_t)capacity * sizeof *door->entries);
-        if (!door->entries)
-            abort();
+        door->entries = pen_realloc_array(door->entries, (size_t)capacity, sizeof *door->entries);
         memset(door->entries + door->capacity, 0,
             (size_t)(capacity - door->capacity) * sizeof *door->entries);
         door->capacity = capacity;
@@ -317,9 +316,7 @@ static int bind_to(const char *listen_on, char *address, size_t address_bytes)
 
 struct door *door_create(const struct door_config *config, struct pen_error *error)
 {
-    struct door *door = calloc(1, sizeof *door);
-    if (!door)
-        abort();
+    struct door *door = pen_alloc_zero(1, sizeof *door);
     door->config = *config;
     door->listen_fd = bind_to(config->listen, door->address, sizeof door->address);
     if (door->listen_fd < 0) {

@@ -1,4 +1,5 @@
 #include "server/hash.h"
+#include "protocol/memory.h"
 #include <openssl/evp.h>
 #include <stdlib.h>
 
@@ -8,9 +9,9 @@ struct hash {
 
 struct hash *hash_create(void)
 {
-    struct hash *hash = malloc(sizeof *hash);
-    if (!hash || !(hash->context = EVP_MD_CTX_new()) ||
-        EVP_DigestInit_ex(hash->context, EVP_sha256(), NULL) != 1)
+    struct hash *hash = pen_alloc(1, sizeof *hash);
+    hash->context = EVP_MD_CTX_new();
+    if (!hash->context || EVP_DigestInit_ex(hash->context, EVP_sha256(), NULL) != 1)
         abort();
     return hash;
 }

@@ -1,4 +1,5 @@
 #include "server/http.h"
+#include "protocol/memory.h"
 #include "server/clock.h"
 #include <arpa/inet.h>
 #include <ctype.h>
@@ -248,9 +249,9 @@ static enum MHD_Result break_off(struct http_exchange *x)
 static void *on_target(void *context, const char *target, struct MHD_Connection *connection)
 {
     struct http_listener *listener = context;
-    struct http_exchange *x = calloc(1, sizeof *x);
-    if (!x || !(x->path = strdup(target)))
-        abort();
+    struct http_exchange *x = pen_alloc_zero(1, sizeof *x);
+    size_t bytes = strlen(target) + 1;
+    x->path = memcpy(pen_alloc(bytes, 1), target, bytes);
     x->listener = listener;
     x->connection = connection;
     x->fd = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD)->connect_fd;
@@ -372,9 +373,7 @@ static void no_log(void *context, const char *format, va_list args)
 struct http_listener *http_listener_create(
     const struct http_config *config, struct pen_error *error)
 {
-    struct http_listener *listener = calloc(1, sizeof *listener);
-    if (!listener)
-        abort();
+    struct http_listener *listener = pen_alloc_zero(1, sizeof *listener);
     listener->config = *config;
     bool tls = config->cert_pem != NULL;
     struct door_config *door = &listener->config.door;

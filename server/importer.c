@@ -1,4 +1,5 @@
 #include "server/importer.h"
+#include "protocol/memory.h"
 #include "protocol/request.h"
 #include "renderer/import/import_process.h"
 #include "server/clock.h"
@@ -226,9 +227,7 @@ static void *run(void *argument)
 
 struct importer *importer_create(const struct importer_config *config)
 {
-    struct importer *importer = calloc(1, sizeof *importer);
-    if (!importer)
-        abort();
+    struct importer *importer = pen_alloc_zero(1, sizeof *importer);
     importer->config = *config;
     pthread_mutex_init(&importer->lock, NULL);
     pthread_cond_init(&importer->work, NULL);

@@ -1,5 +1,6 @@
 #include "server/metrics.h"
 #include "protocol/json_writer.h"
+#include "protocol/memory.h"
 #include <pthread.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -50,9 +51,7 @@ struct metrics {
 
 struct metrics *metrics_create(const struct pen_catalogue *catalogue)
 {
-    struct metrics *m = calloc(1, sizeof *m);
-    if (!m)
-        abort();
+    struct metrics *m = pen_alloc_zero(1, sizeof *m);
     m->catalogue = catalogue;
     pthread_mutex_init(&m->lock, NULL);
     return m;
@@ -131,12 +130,7 @@ void metrics_print(struct metrics_text *text, const char *format, ...)
     int n = vsnprintf(line, sizeof line, format, args);
     va_end(args);
     size_t bytes = n < (int)sizeof line ? (size_t)n : sizeof line - 1;
-    if (text->size + bytes + 1 > text->capacity) {
-        text->capacity = (text->size + bytes + 1) * 2;
-        text->text = realloc(text->text, text->capacity);
-        if (!text->text)
-            abort();
-    }
+    text->text = pen_grow(text->text, &text->capacity, text->size + bytes + 1, 1);
     memcpy(text->text + text->size, line, bytes + 1);
     text->size += bytes;
 }
@@ -170,9 +164,7 @@ static void write_histogram(
 
 void metrics_write(struct metrics *m, struct metrics_text *text)
 {
-    struct metrics *copy = malloc(sizeof *copy);
-    if (!copy)
-        abort();
+    struct metrics *copy = pen_alloc(1, sizeof *copy);
     pthread_mutex_lock(&m->lock);
     memcpy(copy, m, sizeof *copy);
     pthread_mutex_unlock(&m->lock);
@@ -240,10 +232,8 @@ static void write_spread(struct pen_json *json, const char *key, float *values, 
 
 char *metrics_stats_json(struct metrics *m)
 {
-    struct sample *window = malloc(sizeof m->window);
-    float *values = malloc(WINDOW * sizeof *values);
-    if (!window || !values)
-        abort();
+    struct sample *window = pen_alloc(1, sizeof m->window);
+    float *values = pen_alloc(WINDOW, sizeof *values);
     pthread_mutex_lock(&m->lock);
     memcpy(window, m->window, sizeof m->window);
     uint32_t count = m->samples < WINDOW ? (uint32_t)m->samples : WINDOW;

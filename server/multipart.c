@@ -1,4 +1,5 @@
 #include "server/multipart.h"
+#include "protocol/memory.h"
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -68,10 +69,8 @@ static bool find_parameter(const char *header, const char *name, char *value, si
 struct multipart *multipart_create(
     const char *content_type, const struct multipart_sink *sink, struct pen_error *error)
 {
-    struct multipart *m = calloc(1, sizeof *m);
+    struct multipart *m = pen_alloc_zero(1, sizeof *m);
     char boundary[MAX_BOUNDARY + 1];
-    if (!m)
-        abort();
     if (!find_parameter(content_type, "boundary", boundary, sizeof boundary) || !*boundary) {
         pen_fail(error, PEN_UNKNOWN_TYPE, "", "multipart/form-data needs a boundary.");
         free(m);

@@ -1,4 +1,5 @@
 #include "server/quarantine.h"
+#include "protocol/memory.h"
 #include "server/clock.h"
 #include <pthread.h>
 #include <stdlib.h>
@@ -21,9 +22,7 @@ struct quarantine {
 
 struct quarantine *quarantine_create(uint64_t seconds)
 {
-    struct quarantine *q = calloc(1, sizeof *q);
-    if (!q)
-        abort();
+    struct quarantine *q = pen_alloc_zero(1, sizeof *q);
     pthread_mutex_init(&q->lock, NULL);
     q->duration_ns = seconds * CLOCK_S;
     return q;

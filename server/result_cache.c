@@ -1,4 +1,5 @@
 #include "server/result_cache.h"
+#include "protocol/memory.h"
 #include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
@@ -21,9 +22,7 @@ struct result_cache {
 
 struct result_cache *result_cache_create(uint64_t budget_bytes)
 {
-    struct result_cache *cache = calloc(1, sizeof *cache);
-    if (!cache)
-        abort();
+    struct result_cache *cache = pen_alloc_zero(1, sizeof *cache);
     pthread_mutex_init(&cache->lock, NULL);
     cache->budget = budget_bytes;
     return cache;
@@ -103,9 +102,7 @@ bool result_cache_put(struct result_cache *cache, struct picture *picture)
     struct entry *gone = NULL;
     if (cost > cache->budget)
         return false;
-    struct entry *fresh = calloc(1, sizeof *fresh);
-    if (!fresh)
-        abort();
+    struct entry *fresh = pen_alloc_zero(1, sizeof *fresh);
     pthread_mutex_lock(&cache->lock);
     struct entry *same = find(cache, picture->tag);
     if (same) {

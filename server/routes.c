@@ -1,6 +1,8 @@
 #include "server/routes.h"
+#include "protocol/fnv.h"
 #include "protocol/json_request.h"
 #include "protocol/json_result.h"
+#include "protocol/memory.h"
 #include "server/clock.h"
 #include "server/log.h"
 #include <stdio.h>
@@ -210,10 +212,8 @@ static bool authorise(struct call *call, struct pen_error *error)
     const struct service *s = call->service;
     bool open =
         call->route == ROUTE_HOME || call->route == ROUTE_DOCS || call->route == PEN_ROUTE_OPENAPI;
-    uint64_t hash = 1469598103934665603u; /* FNV-1a of the address: clients without a token */
-    for (const char *c = call->exchange->client; *c; c++)
-        hash = (hash ^ (uint8_t)*c) * 1099511628211u;
-    call->client = hash | 1ull << 63;
+    const char *address = call->exchange->client; /* of clients without a token */
+    call->client = pen_fnv(PEN_FNV_START, address, strlen(address)) | 1ull << 63;
     if (!s->auth)
         return true;
     uint32_t token = auth_check(s->auth, http_header(call->exchange, "Authorization"));
@@ -246,10 +246,8 @@ static bool check_body(struct call *call, struct pen_error *error)
 
 static void begin(struct http_exchange *x, const struct pen_error *framing)
 {
-    struct call *call = calloc(1, sizeof *call);
+    struct call *call = pen_alloc_zero(1, sizeof *call);
     struct pen_error error = *framing;
-    if (!call)
-        abort();
     x->user = call;
     call->service = http_listener_context(x->listener);
     call->exchange = x;
@@ -287,12 +285,7 @@ static void body(struct http_exchange *x, const void *data, size_t bytes)
         routes_fail(call, &error, 0);
         return;
     }
-    if (call->text_bytes + bytes > call->text_capacity) {
-        call->text_capacity = (call->text_bytes + bytes) * 2;
-        call->text = realloc(call->text, call->text_capacity);
-        if (!call->text)
-            abort();
-    }
+    call->text = pen_grow(call->text, &call->text_capacity, call->text_bytes + bytes, 1);
     memcpy(call->text + call->text_bytes, data, bytes);
     call->text_bytes += bytes;
 }

@@ -1,4 +1,5 @@
 /* The admin listener: /livez, /readyz and /metrics. Busy is not ready, but never not live. */
+#include "protocol/memory.h"
 #include "server/clock.h"
 #include "server/log.h"
 #include "server/routes.h"
@@ -60,9 +61,7 @@ static void readyz(struct http_exchange *x, struct service *s)
     struct pen_error error = {0};
     uint8_t key[PEN_ID_BYTES];
     uint32_t retry_after_s;
-    struct probe *probe = calloc(1, sizeof *probe);
-    if (!probe)
-        abort();
+    struct probe *probe = pen_alloc_zero(1, sizeof *probe);
     x->user = probe;
     probe->exchange = x;
     probe->service = s;

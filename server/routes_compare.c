@@ -1,5 +1,6 @@
 /* Methods against a reference. */
 #include "protocol/json_compare.h"
+#include "protocol/memory.h"
 #include "server/auto_choice.h"
 #include "server/clock.h"
 #include "server/compare.h"
@@ -24,10 +25,8 @@ static void answer(struct call *call, struct compare *compare)
     struct service *s = call->service;
     const struct compare_row *rows = compare_rows(compare);
     uint32_t count = 1 + call->compare->count;
-    struct pen_compared *out = calloc(count, sizeof *out);
-    char(*links)[4][LINK_BYTES] = calloc(count, sizeof *links);
-    if (!out || !links)
-        abort();
+    struct pen_compared *out = pen_alloc_zero(count, sizeof *out);
+    char(*links)[4][LINK_BYTES] = pen_alloc_zero(count, sizeof *links);
     for (uint32_t i = 0; i < count; i++) {
         out[i].result = &rows[i].result;
         out[i].image = keep(s, rows[i].image, links[i][0]);
@@ -77,9 +76,7 @@ static bool read_body(struct call *call, struct pen_error *error)
     if (call->exchange->query && *call->exchange->query)
         return pen_fail(
             error, PEN_MALFORMED, "", "A comparison is all in its body: there can be no query.");
-    call->compare = malloc(sizeof *call->compare);
-    if (!call->compare)
-        abort();
+    call->compare = pen_alloc(1, sizeof *call->compare);
     return pen_compare_from_json(text, call->text_bytes ? call->text_bytes : 2,
         call->service->catalogue, AUTO_NAME, call->compare, error);
 }

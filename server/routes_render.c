@@ -4,6 +4,7 @@
 #include "server/accept.h"
 #include "server/auto_choice.h"
 #include "server/clock.h"
+#include "server/container.h"
 #include "server/routes.h"
 #include <stdio.h>
 #include <stdlib.h>
@@ -11,7 +12,7 @@
 
 static bool is_gone(struct waiter *waiter)
 {
-    struct call *call = (struct call *)((char *)waiter - offsetof(struct call, waiter));
+    struct call *call = container_of(waiter, struct call, waiter);
     return http_client_is_gone(call->exchange);
 }
 
@@ -76,7 +77,7 @@ static void answer_picture(struct call *call, struct picture *picture)
 /* Any thread. */
 static void finish(struct waiter *waiter, const struct outcome *outcome)
 {
-    struct call *call = (struct call *)((char *)waiter - offsetof(struct call, waiter));
+    struct call *call = container_of(waiter, struct call, waiter);
     call->queue_ms = outcome->queue_ms;
     if (*call->choice && outcome->error.code == PEN_OK)
         auto_runs_observe(call->service->auto_runs, call, outcome->run_ms);

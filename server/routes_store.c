@@ -1,6 +1,7 @@
 /* Scenes and emission images: uploading, listing, describing, removing. */
 #include "protocol/json_request.h"
 #include "protocol/json_writer.h"
+#include "server/container.h"
 #include "server/describe.h"
 #include "server/routes.h"
 #include <stdio.h>
@@ -87,7 +88,7 @@ static char *describe(struct call *call, const uint8_t id[PEN_ID_BYTES], struct 
 /* An importer's thread. */
 static void finish(struct import_task *task)
 {
-    struct call *call = (struct call *)((char *)task - offsetof(struct call, task));
+    struct call *call = container_of(task, struct call, task);
     char hex[PEN_ID_HEX + 1];
     char *text = NULL;
     if (task->error.code == PEN_OK)

@@ -1,4 +1,5 @@
 #include "server/scene_store.h"
+#include "protocol/memory.h"
 #include "renderer/blob/pscene.h"
 #include "server/log.h"
 #include <dirent.h>
@@ -17,7 +18,8 @@ static const char *const kind_blobs[STORE_KINDS] = {"scene.pscene", "image.pscen
 
 struct list {
     struct store_entry *entries; /* in order of id */
-    uint32_t count, capacity;
+    uint32_t count;
+    size_t capacity;
 };
 
 struct scene_store {
@@ -54,12 +56,8 @@ static void insert(struct list *list, const struct store_entry *entry)
     bool found;
     uint32_t at = position(list, entry->id, &found);
     if (!found) {
-        if (list->count == list->capacity) {
-            list->capacity = list->capacity * 2 + 64;
-            list->entries = realloc(list->entries, list->capacity * sizeof *list->entries);
-            if (!list->entries)
-                abort();
-        }
+        list->entries =
+            pen_grow(list->entries, &list->capacity, list->count + 1, sizeof *list->entries);
         memmove(list->entries + at + 1, list->entries + at,
             (list->count++ - at) * sizeof *list->entries);
     }
@@ -163,9 +161,7 @@ static int open_folder(int parent, const char *name)
 
 struct scene_store *scene_store_open(const char *path, struct pen_error *error)
 {
-    struct scene_store *store = calloc(1, sizeof *store);
-    if (!store)
-        abort();
+    struct scene_store *store = pen_alloc_zero(1, sizeof *store);
     pthread_mutex_init(&store->lock, NULL);
     store->tmp = store->lock_file = store->kinds[STORE_SCENES] = store->kinds[STORE_IMAGES] = -1;
     store->root = open_folder(AT_FDCWD, path);

@@ -1,4 +1,5 @@
 #include "server/scheduler.h"
+#include "protocol/memory.h"
 #include "server/clock.h"
 #include <fcntl.h>
 #include <math.h>
@@ -19,7 +20,8 @@ struct scheduler {
     struct render *queue[2][2]; /* [batch][first, last] */
     struct render *running;
     struct share *shares;
-    uint32_t share_count, share_capacity;
+    uint32_t share_count;
+    size_t share_capacity;
     uint64_t next_id;
     uint32_t turn;
     double mean_ms; /* of a render on a worker, decaying */
@@ -33,9 +35,7 @@ struct scheduler {
 struct scheduler *scheduler_create(
     const struct scheduler_limits *limits, void (*on_work)(void *context), void *context)
 {
-    struct scheduler *s = calloc(1, sizeof *s);
-    if (!s)
-        abort();
+    struct scheduler *s = pen_alloc_zero(1, sizeof *s);
     pthread_mutex_init(&s->lock, NULL);
     s->limits = *limits;
     s->on_work = on_work;
@@ -69,12 +69,7 @@ static void use_share(struct scheduler *s, uint64_t client)
 {
     struct share *share = find_share(s, client);
     if (!share) {
-        if (s->share_count == s->share_capacity) {
-            s->share_capacity = s->share_capacity * 2 + 16;
-            s->shares = realloc(s->shares, s->share_capacity * sizeof *s->shares);
-            if (!s->shares)
-                abort();
-        }
+        s->shares = pen_grow(s->shares, &s->share_capacity, s->share_count + 1, sizeof *s->shares);
         share = &s->shares[s->share_count++];
         *share = (struct share){.client = client};
     }
@@ -168,9 +163,7 @@ bool scheduler_submit(struct scheduler *s, const struct pen_request *request,
     struct pen_error *error)
 {
     bool batch = request->delivery.priority == PEN_PRIORITY_BATCH;
-    struct render *fresh = calloc(1, sizeof *fresh);
-    if (!fresh)
-        abort();
+    struct render *fresh = pen_alloc_zero(1, sizeof *fresh);
     pthread_mutex_lock(&s->lock);
     struct share *share = find_share(s, waiter->client);
     struct render *render = shareable ? find_key(s, key) : NULL;

@@ -1,5 +1,6 @@
 #include "server/service.h"
 #include "protocol/json_result.h"
+#include "protocol/memory.h"
 #include "protocol/openapi.h"
 #include "renderer/blob/builder.h"
 #include "server/auto_choice.h"
@@ -144,10 +145,8 @@ static bool name_build(const char *worker_path, struct pen_error *error)
 
 static char *read_file(const char *path, struct pen_error *error)
 {
-    char *text = calloc(1, 1 << 18);
+    char *text = pen_alloc_zero(1, 1 << 18);
     FILE *file = fopen(path, "re");
-    if (!text)
-        abort();
     if (!file || !fread(text, 1, (1 << 18) - 1, file)) {
         pen_fail(error, PEN_UNAVAILABLE, "", "%.200s cannot be read.", path);
         free(text);
@@ -196,10 +195,8 @@ static void refresh_stale(struct service *s)
             memcpy(after, entry.id, PEN_ID_BYTES);
             if (!entry.stale)
                 continue;
-            struct import_task *task = calloc(1, sizeof *task);
+            struct import_task *task = pen_alloc_zero(1, sizeof *task);
             struct pen_error error = {0};
-            if (!task)
-                abort();
             task->kind = kind;
             task->finish = finish_refresh;
             memcpy(task->id, entry.id, PEN_ID_BYTES);
@@ -281,9 +278,7 @@ static bool start_listeners(struct service *s, struct pen_error *error)
 struct service *service_create(
     const struct config *config, const struct pen_catalogue *catalogue, struct pen_error *error)
 {
-    struct service *s = calloc(1, sizeof *s);
-    if (!s)
-        abort();
+    struct service *s = pen_alloc_zero(1, sizeof *s);
     s->config = config;
     s->catalogue = catalogue = auto_catalogue(catalogue);
     s->auto_runs = auto_runs_create();

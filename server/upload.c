@@ -1,4 +1,5 @@
 #include "server/upload.h"
+#include "protocol/memory.h"
 #include "renderer/import/bundle.h"
 #include "server/hash.h"
 #include "server/multipart.h"
@@ -25,7 +26,8 @@ struct upload {
     struct hash *hash;
     struct multipart *multipart; /* NULL: a raw body */
     struct part *parts;
-    uint32_t part_count, part_capacity;
+    uint32_t part_count;
+    size_t part_capacity;
 };
 
 static bool write_all(int fd, const void *data, size_t bytes, struct pen_error *error)
@@ -72,12 +74,7 @@ static bool begin_part(void *context, const char *name, struct pen_error *error)
     if (u->part_count == PEN_BUNDLE_MAX_ENTRIES)
         return pen_fail(
             error, PEN_TOO_BIG, "", "An upload has at most %d files.", PEN_BUNDLE_MAX_ENTRIES);
-    if (u->part_count == u->part_capacity) {
-        u->part_capacity = u->part_capacity * 2 + 16;
-        u->parts = realloc(u->parts, u->part_capacity * sizeof *u->parts);
-        if (!u->parts)
-            abort();
-    }
+    u->parts = pen_grow(u->parts, &u->part_capacity, u->part_count + 1, sizeof *u->parts);
     struct part *part = &u->parts[u->part_count++];
     snprintf(part->name, sizeof part->name, "%s", name);
     part->offset = u->written;
@@ -96,9 +93,7 @@ static bool add_data(void *context, const void *data, size_t bytes, struct pen_e
 struct upload *upload_create(
     struct scene_store *store, const char *content_type, uint64_t limit, struct pen_error *error)
 {
-    struct upload *u = calloc(1, sizeof *u);
-    if (!u)
-        abort();
+    struct upload *u = pen_alloc_zero(1, sizeof *u);
     u->store = store;
     u->limit = limit;
     u->file = u->staging.folder = -1;

@@ -1,5 +1,6 @@
 /* penumbra-worker: one GL context on the main thread, and encoder threads, so that frame N + 1
  * renders while frame N is encoded. Talks to penumbrad on CHANNEL_WORKER_FD and ends with it. */
+#include "protocol/memory.h"
 #include "renderer/renderer.h"
 #include "server/channel.h"
 #include "server/clock.h"
@@ -89,9 +90,7 @@ static bool run_job(
     const struct channel_job *job = &message->job_data;
     struct channel_message note = {CHANNEL_VERSION, CHANNEL_STARTED, message->job};
     send_or_exit(&note);
-    struct worker_item *item = calloc(1, sizeof *item);
-    if (!item)
-        abort();
+    struct worker_item *item = pen_alloc_zero(1, sizeof *item);
     struct pen_result *result = &item->message.result;
     struct pen_error *error = &result->error;
     item->message.version = CHANNEL_VERSION;

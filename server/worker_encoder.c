@@ -1,4 +1,5 @@
 #include "server/worker_encoder.h"
+#include "protocol/memory.h"
 #include "renderer/encode/encode.h"
 #include "server/clock.h"
 #include "server/worker_measure.h"
@@ -114,9 +115,7 @@ static void *run(void *argument)
 
 struct worker_encoder *worker_encoder_create(int socket)
 {
-    struct worker_encoder *encoder = calloc(1, sizeof *encoder);
-    if (!encoder)
-        abort();
+    struct worker_encoder *encoder = pen_alloc_zero(1, sizeof *encoder);
     encoder->socket = socket;
     pthread_mutex_init(&encoder->lock, NULL);
     pthread_cond_init(&encoder->work, NULL);

@@ -1,4 +1,5 @@
 #include "server/worker_measure.h"
+#include "protocol/memory.h"
 #include "renderer/encode/encode.h"
 #include "renderer/metrics/metrics.h"
 #include <math.h>
@@ -97,10 +98,8 @@ static bool hand_over_png(const struct planes *size, const void *values,
 {
     static const struct pen_output output = {.format = PEN_PNG, .bit_depth = 8};
     size_t pixels = (size_t)size->width * size->height;
-    uint8_t *data = malloc(pixels * 4);
+    uint8_t *data = pen_alloc(pixels * 4, 1);
     struct pen_bytes bytes = {0};
-    if (!data)
-        abort();
     for (size_t i = 0; i < pixels; i++) {
         float rgb[3];
         paint(values, i, rgb);

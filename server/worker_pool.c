@@ -1,4 +1,5 @@
 #include "server/worker_pool.h"
+#include "protocol/memory.h"
 #include "server/clock.h"
 #include "server/log.h"
 #include "server/measured.h"
@@ -450,9 +451,7 @@ static void *run(void *argument)
 
 struct worker_pool *worker_pool_create(const struct worker_pool_config *config)
 {
-    struct worker_pool *pool = calloc(1, sizeof *pool);
-    if (!pool)
-        abort();
+    struct worker_pool *pool = pen_alloc_zero(1, sizeof *pool);
     pool->config = *config;
     pthread_mutex_init(&pool->lock, NULL);
     pool->quarantine = quarantine_create(config->quarantine_s);

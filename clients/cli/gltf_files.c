@@ -1,4 +1,5 @@
 #include "clients/cli/gltf_files.h"
+#include "protocol/memory.h"
 #include "protocol/request.h"
 #include "renderer/import/bundle.h"
 #include <openssl/evp.h>
@@ -8,9 +9,7 @@
 
 static void add(struct cli_files *files, char *name, char *path, const char *type)
 {
-    files->parts = realloc(files->parts, (files->count + 1) * sizeof *files->parts);
-    if (!files->parts)
-        abort();
+    files->parts = pen_realloc_array(files->parts, files->count + 1, sizeof *files->parts);
     files->parts[files->count++] = (struct cli_part){name, path, type};
 }
 

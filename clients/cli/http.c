@@ -1,4 +1,5 @@
 #include "clients/cli/http.h"
+#include "protocol/memory.h"
 #include <curl/curl.h>
 #include <stdlib.h>
 #include <string.h>
@@ -40,12 +41,7 @@ static size_t on_body(char *data, size_t one, size_t bytes, void *user)
     }
     if (answer->bytes + bytes > MAX_TEXT)
         return 0;
-    if (answer->bytes + bytes + 1 > transfer->capacity) {
-        transfer->capacity = 2 * (answer->bytes + bytes + 1);
-        answer->text = realloc(answer->text, transfer->capacity);
-        if (!answer->text)
-            abort();
-    }
+    answer->text = pen_grow(answer->text, &transfer->capacity, answer->bytes + bytes + 1, 1);
     memcpy(answer->text + answer->bytes, data, bytes);
     answer->bytes += bytes;
     answer->text[answer->bytes] = 0;

@@ -1,4 +1,5 @@
 #include "renderer/blob/builder.h"
+#include "protocol/memory.h"
 #include "renderer/blob/check.h"
 #include "renderer/blob/geometry.h"
 #include <float.h>
@@ -21,10 +22,7 @@ struct psc_builder {
 
 static void *append(struct array *array, const void *data, size_t bytes)
 {
-    if (array->capacity - array->bytes < bytes) {
-        array->capacity = array->bytes + bytes + array->capacity / 2 + 256;
-        array->data = psc_reallocate(array->data, array->capacity, 1);
-    }
+    array->data = pen_grow(array->data, &array->capacity, array->bytes + bytes, 1);
     char *at = array->data + array->bytes;
     if (data)
         memcpy(at, data, bytes);
@@ -40,7 +38,7 @@ static uint32_t append_item(struct array *array, const void *item, size_t bytes)
 
 struct psc_builder *psc_builder_create(void)
 {
-    struct psc_builder *builder = psc_allocate(1, sizeof *builder);
+    struct psc_builder *builder = pen_alloc(1, sizeof *builder);
     memset(builder, 0, sizeof *builder);
     return builder;
 }
@@ -288,7 +286,7 @@ bool psc_builder_finish(struct psc_builder *builder, const uint8_t source[PEN_ID
         end = header.sections[i].offset + header.sections[i].bytes;
     }
     header.file_bytes = end;
-    char *file = psc_allocate(end, 1);
+    char *file = pen_alloc(end, 1);
     memset(file, 0, header.sections[0].offset);
     memcpy(file, &header, sizeof header);
     for (int i = 0; i < PSC_SECTIONS; i++) {

@@ -14,10 +14,6 @@ struct geometry {
     uint32_t index_count;
 };
 
-/* Never return NULL: out of memory aborts. */
-void *psc_allocate(size_t count, size_t item_bytes);
-void *psc_reallocate(void *memory, size_t count, size_t item_bytes);
-
 /* Unit normal in double precision; false for a triangle without area. */
 bool psc_triangle_normal(const float a[3], const float b[3], const float c[3], double normal[3]);
 

@@ -1,21 +1,10 @@
 /* From a caller's mesh to checked arrays of our own. */
+#include "protocol/memory.h"
 #include "renderer/blob/geometry.h"
 #include "renderer/blob/check.h"
+#include <stdlib.h>
 
 #define FARTHEST 1e12f /* m; squares and sums of such coordinates stay finite in float */
-
-void *psc_allocate(size_t count, size_t item_bytes)
-{
-    return psc_reallocate(NULL, count, item_bytes);
-}
-
-void *psc_reallocate(void *memory, size_t count, size_t item_bytes)
-{
-    void *p = reallocarray(memory, count ? count : 1, item_bytes);
-    if (!p)
-        abort();
-    return p;
-}
 
 bool psc_triangle_normal(const float a[3], const float b[3], const float c[3], double normal[3])
 {
@@ -89,7 +78,7 @@ static void normalize_normals(struct geometry *g)
         if (normalize3(g->normals[i]))
             continue;
         if (!missing)
-            missing = memset(psc_allocate(g->vertex_count, sizeof *missing), 0, g->vertex_count);
+            missing = memset(pen_alloc(g->vertex_count, sizeof *missing), 0, g->vertex_count);
         missing[i] = true;
         memcpy(g->normals[i], (float[3]){0, 1, 0}, sizeof g->normals[i]);
     }
@@ -137,21 +126,21 @@ static void flat_normals(struct geometry *g)
 static void choose_vertices(struct geometry *g, const struct psc_mesh *mesh, uint32_t **sources)
 {
     g->index_count = mesh->index_count;
-    g->indices = psc_allocate(g->index_count, sizeof *g->indices);
+    g->indices = pen_alloc(g->index_count, sizeof *g->indices);
     if (!mesh->normals) { /* flat: every corner is a vertex of its own */
         g->vertex_count = mesh->index_count;
-        *sources = psc_allocate(g->vertex_count, sizeof **sources);
+        *sources = pen_alloc(g->vertex_count, sizeof **sources);
         for (uint32_t i = 0; i < g->index_count; i++) {
             (*sources)[i] = mesh->indices ? mesh->indices[i] : i;
             g->indices[i] = i;
         }
         return;
     }
-    uint32_t *ours = psc_allocate(mesh->vertex_count, sizeof *ours);
+    uint32_t *ours = pen_alloc(mesh->vertex_count, sizeof *ours);
     memset(ours, 0, mesh->vertex_count * sizeof *ours);
     for (uint32_t i = 0; i < g->index_count; i++)
         ours[mesh->indices ? mesh->indices[i] : i] = 1;
-    *sources = psc_allocate(mesh->vertex_count, sizeof **sources);
+    *sources = pen_alloc(mesh->vertex_count, sizeof **sources);
     for (uint32_t v = 0; v < mesh->vertex_count; v++)
         if (ours[v]) {
             ours[v] = g->vertex_count;
@@ -170,12 +159,12 @@ bool psc_geometry_create(struct geometry *g, const struct psc_mesh *mesh, struct
     uint32_t *sources;
     choose_vertices(g, mesh, &sources);
     uint32_t n = g->vertex_capacity = g->vertex_count;
-    g->positions = psc_allocate(n, sizeof *g->positions);
-    g->normals = psc_allocate(n, sizeof *g->normals);
-    g->uv = psc_allocate(n, sizeof *g->uv);
-    g->colors = psc_allocate(n, sizeof *g->colors);
+    g->positions = pen_alloc(n, sizeof *g->positions);
+    g->normals = pen_alloc(n, sizeof *g->normals);
+    g->uv = pen_alloc(n, sizeof *g->uv);
+    g->colors = pen_alloc(n, sizeof *g->colors);
     if (mesh->tangents && mesh->normals) /* given tangents belong to given normals */
-        g->tangents = psc_allocate(n, sizeof *g->tangents);
+        g->tangents = pen_alloc(n, sizeof *g->tangents);
 
     for (uint32_t i = 0; i < n; i++) {
         uint32_t from = sources[i];

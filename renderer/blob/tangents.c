@@ -1,6 +1,7 @@
 /* Tangents from texture coordinates: each triangle's direction of growing u, accumulated per vertex
  * with the corner's angle as weight, then made orthogonal to the normal. The bitangent,
  * w * cross(normal, tangent), points against growing v: up in the image, where green points. */
+#include "protocol/memory.h"
 #include "renderer/blob/geometry.h"
 #include <math.h>
 #include <stdlib.h>
@@ -52,10 +53,10 @@ static uint32_t copy_vertex(struct geometry *g, uint32_t from)
 {
     if (g->vertex_count == g->vertex_capacity) {
         uint32_t n = g->vertex_capacity += g->vertex_capacity / 2 + 64;
-        g->positions = psc_reallocate(g->positions, n, sizeof *g->positions);
-        g->normals = psc_reallocate(g->normals, n, sizeof *g->normals);
-        g->uv = psc_reallocate(g->uv, n, sizeof *g->uv);
-        g->colors = psc_reallocate(g->colors, n, sizeof *g->colors);
+        g->positions = pen_realloc_array(g->positions, n, sizeof *g->positions);
+        g->normals = pen_realloc_array(g->normals, n, sizeof *g->normals);
+        g->uv = pen_realloc_array(g->uv, n, sizeof *g->uv);
+        g->colors = pen_realloc_array(g->colors, n, sizeof *g->colors);
     }
     uint32_t to = g->vertex_count++;
     memcpy(g->positions[to], g->positions[from], sizeof g->positions[to]);
@@ -90,8 +91,8 @@ void psc_geometry_make_tangents(struct geometry *g)
 {
     uint32_t before = g->vertex_count;
     /* Per vertex and side. */
-    double(*sums)[2][3] = psc_allocate(before, sizeof *sums);
-    bool(*used)[2] = psc_allocate(before, sizeof *used);
+    double(*sums)[2][3] = pen_alloc(before, sizeof *sums);
+    bool(*used)[2] = pen_alloc(before, sizeof *used);
     memset(sums, 0, before * sizeof *sums);
     memset(used, 0, before * sizeof *used);
     for (uint32_t i = 0; i < g->index_count; i += 3) {
@@ -109,7 +110,7 @@ void psc_geometry_make_tangents(struct geometry *g)
     }
 
     /* A vertex on the seam between mirrored halves gets a twin for the mirrored one. */
-    uint32_t *twins = psc_allocate(before, sizeof *twins);
+    uint32_t *twins = pen_alloc(before, sizeof *twins);
     for (uint32_t v = 0; v < before; v++)
         twins[v] = used[v][0] && used[v][1] ? copy_vertex(g, v) : v;
     for (uint32_t i = 0; g->vertex_count > before && i < g->index_count; i += 3) {
@@ -120,7 +121,7 @@ void psc_geometry_make_tangents(struct geometry *g)
                 g->indices[i + c] = twins[g->indices[i + c]];
     }
 
-    g->tangents = psc_allocate(g->vertex_count, sizeof *g->tangents);
+    g->tangents = pen_alloc(g->vertex_count, sizeof *g->tangents);
     for (uint32_t v = 0; v < before; v++) {
         int side = used[v][0] ? 0 : used[v][1];
         orthonormalize(g->normals[v], sums[v][side], g->tangents[v]);

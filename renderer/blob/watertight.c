@@ -1,3 +1,4 @@
+#include "protocol/memory.h"
 #include "renderer/blob/geometry.h"
 #include <stdlib.h>
 #include <string.h>
@@ -45,7 +46,7 @@ static void weld(
     const float (*positions)[3], uint32_t vertex_count, const uint64_t *hashes, uint32_t *first)
 {
     size_t size = table_size(vertex_count);
-    uint32_t *table = psc_allocate(size, sizeof *table);
+    uint32_t *table = pen_alloc(size, sizeof *table);
     memset(table, 0xff, size * sizeof *table);
     for (uint32_t v = 0; v < vertex_count; v++) {
         size_t at = hashes[v] & (size - 1);
@@ -62,7 +63,7 @@ static void weld(
 static bool edges_match(const uint32_t *first, const uint32_t *indices, uint32_t index_count)
 {
     size_t size = table_size(index_count);
-    uint64_t *table = psc_allocate(size, sizeof *table);
+    uint64_t *table = pen_alloc(size, sizeof *table);
     memset(table, 0xff, size * sizeof *table);
     bool match = true;
     for (int pass = 0; pass < 2 && match; pass++) /* insert all, then look up the opposites */
@@ -89,7 +90,7 @@ bool psc_is_watertight(const float (*positions)[3], uint32_t vertex_count, const
 {
     if (!index_count)
         return false;
-    uint64_t *hashes = psc_allocate(vertex_count, sizeof *hashes);
+    uint64_t *hashes = pen_alloc(vertex_count, sizeof *hashes);
     for (uint32_t v = 0; v < vertex_count; v++)
         hashes[v] = position_hash(positions[v]);
 
@@ -107,7 +108,7 @@ bool psc_is_watertight(const float (*positions)[3], uint32_t vertex_count, const
     }
     bool watertight = any && sum == 0;
     if (watertight) {
-        uint32_t *first = psc_allocate(vertex_count, sizeof *first);
+        uint32_t *first = pen_alloc(vertex_count, sizeof *first);
         weld(positions, vertex_count, hashes, first);
         watertight = edges_match(first, indices, index_count);
         free(first);

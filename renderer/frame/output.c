@@ -1,4 +1,5 @@
 #include "renderer/frame/output.h"
+#include "protocol/memory.h"
 #include "renderer/frame/layers.h"
 #include "renderer/passes/draw/passes.h"
 #include <math.h>
@@ -129,9 +130,7 @@ static void read_plane(
     snprintf(plane->name, sizeof plane->name, "%s", pen_layer_names[layer]);
     plane->pixel = pixel;
     plane->channels = channels_of(layer, pixel);
-    plane->data = malloc((size_t)frame->width * frame->height * pixel_bytes[pixel]);
-    if (!plane->data)
-        abort();
+    plane->data = pen_alloc((size_t)frame->width * frame->height * pixel_bytes[pixel], 1);
     gl_timer_begin(&job->ctx->timer, PEN_STAGE_READBACK, "readback");
     gl.BindFramebuffer(GL_FRAMEBUFFER, job->targets->color_framebuffer);
     gl.PixelStorei(GL_PACK_ALIGNMENT, 1);

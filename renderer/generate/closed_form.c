@@ -1,9 +1,9 @@
 /* Scenes whose visibility is known in closed form (T1 to T7). Every one has a receiver at y = 0
  * that is at least as wide as its half-plane casters, so that below a caster no light passes
  * outside. */
+#include "protocol/memory.h"
 #include "renderer/generate/model.h"
 #include <math.h>
-#include <stdlib.h>
 
 #define HALF 4.0 /* m, half the receiver's side */
 
@@ -36,7 +36,7 @@ static uint32_t caster_material(struct model *model, double r, double g, double 
 static uint32_t star_image(struct model *model)
 {
     const uint32_t side = 256;
-    uint8_t *rgba = shape_grow(NULL, side * side, 4);
+    uint8_t *rgba = pen_alloc(side * side, 4);
     for (uint32_t y = 0; y < side; y++)
         for (uint32_t x = 0; x < side; x++) {
             double px = 2 * (x + 0.5) / side - 1, py = 1 - 2 * (y + 0.5) / side;

@@ -1,4 +1,5 @@
 #include "renderer/generate/generate.h"
+#include "protocol/memory.h"
 #include "renderer/generate/model.h"
 #include <math.h>
 #include <stdlib.h>
@@ -40,7 +41,7 @@ static struct model *make(const struct pen_generated_options *given,
 {
     if (!complete(given, o, error))
         return NULL;
-    struct model *model = shape_grow(NULL, 1, sizeof *model);
+    struct model *model = pen_alloc(1, sizeof *model);
     memset(model, 0, sizeof *model);
     if (o->kind == PEN_GENERATED_DEMO)
         model_demo(model, o);

@@ -1,4 +1,5 @@
 /* glTF 2.0 binary: a JSON chunk and a BIN chunk. */
+#include "protocol/memory.h"
 #include "renderer/generate/model.h"
 #include <math.h>
 #include <stdarg.h>
@@ -8,7 +9,7 @@
 
 struct bytes {
     char *data;
-    uint64_t count, capacity;
+    size_t count, capacity;
 };
 
 struct writer {
@@ -19,10 +20,7 @@ struct writer {
 
 static void put(struct bytes *b, const void *data, uint64_t count)
 {
-    if (b->capacity - b->count < count) {
-        b->capacity = b->count + count + b->capacity / 2 + 1024;
-        b->data = shape_grow(b->data, b->capacity, 1);
-    }
+    b->data = pen_grow(b->data, &b->capacity, b->count + count, 1);
     memcpy(b->data + b->count, data, count);
     b->count += count;
 }
@@ -242,7 +240,7 @@ bool model_to_glb(const struct model *model, void **data, size_t *bytes, struct 
         const uint32_t head[5] = {
             0x46546c67, 2, (uint32_t)total, (uint32_t)w.json.count, 0x4e4f534a};
         const uint32_t bin[2] = {(uint32_t)w.bin.count, 0x004e4942};
-        char *file = shape_grow(NULL, total, 1);
+        char *file = pen_alloc(total, 1);
         memcpy(file, head, sizeof head);
         memcpy(file + 20, w.json.data, w.json.count);
         memcpy(file + 20 + w.json.count, bin, sizeof bin);

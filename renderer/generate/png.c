@@ -1,4 +1,5 @@
 /* The smallest PNG writer that is still a PNG: stored deflate blocks (RFC 1950, 1951; PNG 1.2). */
+#include "protocol/memory.h"
 #include "renderer/generate/model.h"
 #include <pthread.h>
 #include <stdlib.h>
@@ -52,7 +53,7 @@ uint8_t *png_write(const uint8_t *rgba, uint32_t width, uint32_t height, uint64_
     uint64_t row = 1 + (uint64_t)width * channels, raw = row * height;
     uint64_t blocks = (raw + 65534) / 65535, packed = 2 + raw + 5 * blocks + 4;
     *bytes = 8 + 25 + 12 + packed + 12;
-    uint8_t *file = shape_grow(NULL, *bytes, 1), *scan = shape_grow(NULL, raw, 1), *at = scan;
+    uint8_t *file = pen_alloc(*bytes, 1), *scan = pen_alloc(raw, 1), *at = scan;
     for (uint32_t y = 0; y < height; y++) {
         *at++ = 0; /* no filter */
         for (uint32_t x = 0; x < width; x++, at += channels)

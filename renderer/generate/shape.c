@@ -1,15 +1,8 @@
 #include "renderer/generate/shape.h"
+#include "protocol/memory.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-void *shape_grow(void *memory, uint64_t count, uint64_t item_bytes)
-{
-    void *p = reallocarray(memory, count ? count : 1, item_bytes);
-    if (!p)
-        abort();
-    return p;
-}
 
 void shape_finish(struct shape *s)
 {
@@ -24,14 +17,12 @@ void shape_reserve(struct shape *s, uint32_t vertices, uint32_t indices)
 {
     if (vertices > s->vertex_capacity - s->vertex_count) {
         uint32_t n = s->vertex_capacity = s->vertex_count + vertices + s->vertex_count / 2 + 64;
-        s->positions = shape_grow(s->positions, n, sizeof *s->positions);
-        s->normals = shape_grow(s->normals, n, sizeof *s->normals);
-        s->uv = shape_grow(s->uv, n, sizeof *s->uv);
+        s->positions = pen_realloc_array(s->positions, n, sizeof *s->positions);
+        s->normals = pen_realloc_array(s->normals, n, sizeof *s->normals);
+        s->uv = pen_realloc_array(s->uv, n, sizeof *s->uv);
     }
-    if (indices > s->index_capacity - s->index_count) {
-        s->index_capacity = s->index_count + indices + s->index_count / 2 + 192;
-        s->indices = shape_grow(s->indices, s->index_capacity, sizeof *s->indices);
-    }
+    s->indices =
+        pen_grow(s->indices, &s->index_capacity, s->index_count + indices, sizeof *s->indices);
 }
 
 uint32_t shape_vertex(

@@ -2,6 +2,7 @@
  * counter-clockwise front faces; texture v grows downwards, as in glTF. */
 #pragma once
 #include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
 
 struct shape {
@@ -10,11 +11,11 @@ struct shape {
     float (*uv)[2];
     uint32_t vertex_count, vertex_capacity;
     uint32_t *indices;
-    uint32_t index_count, index_capacity;
+    uint32_t index_count;
+    size_t index_capacity;
 };
 
 void shape_finish(struct shape *shape);
-void *shape_grow(void *memory, uint64_t count, uint64_t item_bytes); /* aborts when out of memory */
 void shape_reserve(struct shape *shape, uint32_t vertices, uint32_t indices);
 uint32_t shape_vertex(
     struct shape *shape, const double position[3], const double normal[3], double u, double v);

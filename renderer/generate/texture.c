@@ -1,5 +1,6 @@
 /* Procedural textures, all of which repeat without a seam. */
 #include "renderer/generate/texture.h"
+#include "protocol/memory.h"
 #include <math.h>
 #include <stdlib.h>
 
@@ -77,7 +78,7 @@ static void store(uint8_t *texel, double r, double g, double b, double a)
 
 uint32_t texture_paving(struct model *model, uint32_t side)
 {
-    uint8_t *rgba = shape_grow(NULL, side * side, 4);
+    uint8_t *rgba = pen_alloc(side * side, 4);
     for (uint32_t y = 0; y < side; y++)
         for (uint32_t x = 0; x < side; x++) {
             double u = (x + 0.5) / side, v = (y + 0.5) / side;
@@ -96,7 +97,7 @@ uint32_t texture_paving(struct model *model, uint32_t side)
 
 uint32_t texture_stone(struct model *model, uint32_t side)
 {
-    uint8_t *rgba = shape_grow(NULL, side * side, 4);
+    uint8_t *rgba = pen_alloc(side * side, 4);
     for (uint32_t y = 0; y < side; y++)
         for (uint32_t x = 0; x < side; x++) {
             double u = (x + 0.5) / side, v = (y + 0.5) / side;
@@ -112,8 +113,8 @@ uint32_t texture_stone(struct model *model, uint32_t side)
 static uint32_t normal_map(
     struct model *model, uint32_t side, double (*height)(double, double), double strength)
 {
-    uint8_t *rgba = shape_grow(NULL, side * side, 4);
-    float *field = shape_grow(NULL, side * side, sizeof *field);
+    uint8_t *rgba = pen_alloc(side * side, 4);
+    float *field = pen_alloc(side * side, sizeof *field);
     for (uint32_t y = 0; y < side; y++)
         for (uint32_t x = 0; x < side; x++)
             field[y * side + x] = (float)height((x + 0.5) / side, (y + 0.5) / side);
@@ -145,7 +146,7 @@ uint32_t texture_stone_normal(struct model *model, uint32_t side)
  */
 uint32_t texture_leaf(struct model *model, uint32_t side)
 {
-    uint8_t *rgba = shape_grow(NULL, side * side, 4);
+    uint8_t *rgba = pen_alloc(side * side, 4);
     for (uint32_t y = 0; y < side; y++)
         for (uint32_t x = 0; x < side; x++) {
             double px = 2 * (x + 0.5) / side - 1,

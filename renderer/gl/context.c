@@ -1,4 +1,5 @@
 #include "renderer/gl/context.h"
+#include "protocol/memory.h"
 #include "renderer/gl/gl.h"
 #include <EGL/egl.h>
 #include <EGL/eglext.h>
@@ -221,9 +222,7 @@ static void describe(struct pen_device_info *info, const char *platform)
 struct gl_context *gl_context_create(
     const struct pen_renderer_config *config, struct pen_device_info *info, struct pen_error *error)
 {
-    struct gl_context *c = calloc(1, sizeof *c);
-    if (!c)
-        abort();
+    struct gl_context *c = pen_alloc_zero(1, sizeof *c);
     const char *platform = NULL;
     struct pen_error gpu = {0}, surfaceless = {0}, osmesa = {0};
     bool any = config->device == PEN_DEVICE_AUTO;

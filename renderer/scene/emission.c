@@ -1,4 +1,5 @@
 #include "renderer/scene/emission.h"
+#include "protocol/memory.h"
 #include "renderer/scene/emission_pattern.h"
 #include <math.h>
 #include <stdlib.h>
@@ -26,17 +27,9 @@ struct emission_cache {
     uint64_t bytes, clock;
 };
 
-static void *allocate(size_t count, size_t size)
-{
-    void *p = calloc(count, size);
-    if (!p)
-        abort();
-    return p;
-}
-
 struct emission_cache *emission_cache_create(void)
 {
-    return allocate(1, sizeof(struct emission_cache));
+    return pen_alloc_zero(1, sizeof(struct emission_cache));
 }
 
 static void remove_entry(struct emission_cache *cache, struct entry **at)
@@ -109,8 +102,8 @@ static void upload(struct emission *emission, uint32_t side, float (*texels)[4])
 static void make_pattern(struct emission *emission, uint32_t pattern, uint32_t frame)
 {
     const uint32_t side = LEAST_SIDE;
-    float(*rgb)[3] = allocate((size_t)side * side, sizeof *rgb);
-    float(*texels)[4] = allocate((size_t)side * side, sizeof *texels);
+    float(*rgb)[3] = pen_alloc_zero((size_t)side * side, sizeof *rgb);
+    float(*texels)[4] = pen_alloc_zero((size_t)side * side, sizeof *texels);
     emission_pattern_draw(pattern, frame, side, rgb);
     for (uint32_t y = 0; y < side; y++)
         for (uint32_t x = 0; x < side; x++)
@@ -149,7 +142,7 @@ static float overlap_weight(const struct overlap *o, uint32_t i)
 static void resample(
     const float (*source)[4], uint32_t width, uint32_t height, uint32_t side, float (*texels)[4])
 {
-    float(*rows)[4] = allocate((size_t)side * height, sizeof *rows);
+    float(*rows)[4] = pen_alloc_zero((size_t)side * height, sizeof *rows);
     for (uint32_t x = 0; x < side; x++) {
         struct overlap o = overlap_of(x, side, width);
         for (uint32_t i = o.first; i < o.last; i++) {
@@ -190,14 +183,14 @@ static void make_image(struct emission *emission, const struct psc_scene *blob, 
     float linear[256];
     for (int i = 0; i < 256; i++)
         linear[i] = image->srgb ? srgb_to_linear((float)i / 255) : (float)i / 255;
-    float(*source)[4] = allocate((size_t)w * h, sizeof *source);
+    float(*source)[4] = pen_alloc_zero((size_t)w * h, sizeof *source);
     for (size_t i = 0; i < (size_t)w * h; i++)
         for (int k = 0; k < 3; k++)
             source[i][k] = linear[bytes[4 * i + k]] * (float)bytes[4 * i + 3] / 255;
     uint32_t side = LEAST_SIDE;
     while (side < MOST_SIDE && (side < w || side < h))
         side *= 2;
-    float(*texels)[4] = allocate((size_t)side * side, sizeof *texels);
+    float(*texels)[4] = pen_alloc_zero((size_t)side * side, sizeof *texels);
     resample((const float(*)[4])source, w, h, side, texels);
     upload(emission, side, texels);
     free(texels);
@@ -232,7 +225,7 @@ const struct emission *emission_cache_get(struct emission_cache *cache,
             e->last_use = ++cache->clock;
             return &e->emission;
         }
-    struct entry *e = allocate(1, sizeof *e);
+    struct entry *e = pen_alloc_zero(1, sizeof *e);
     e->key = key;
     e->last_use = ++cache->clock;
     if (pattern)

@@ -1,4 +1,5 @@
 #include "renderer/scene/scene.h"
+#include "protocol/memory.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -47,9 +48,7 @@ static bool has_textures(const struct psc_material *m)
 static void upload_materials(struct scene *s)
 {
     uint32_t n = s->blob.material_count;
-    struct material_record *records = calloc(n ? n : 1, sizeof *records);
-    if (!records)
-        abort();
+    struct material_record *records = pen_alloc_zero(n, sizeof *records);
     for (uint32_t i = 0; i < n; i++) {
         const struct psc_material *m = &s->blob.materials[i];
         struct material_record *r = &records[i];
@@ -82,9 +81,7 @@ static void upload_materials(struct scene *s)
 static void upload_instances(struct scene *s)
 {
     uint32_t n = s->blob.instance_count;
-    struct instance_record *records = calloc(n ? n : 1, sizeof *records);
-    if (!records)
-        abort();
+    struct instance_record *records = pen_alloc_zero(n, sizeof *records);
     for (uint32_t i = 0; i < n; i++) {
         memcpy(records[i].rows, s->blob.instances[i].world, 48);
         records[i].material = s->blob.primitives[s->blob.instances[i].primitive].material;
@@ -95,10 +92,8 @@ static void upload_instances(struct scene *s)
 
 static void upload_images(struct scene *s)
 {
-    s->images = calloc(s->blob.image_count + 1, sizeof *s->images);
-    s->samplers = calloc(s->blob.texture_count + 1, sizeof *s->samplers);
-    if (!s->images || !s->samplers)
-        abort();
+    s->images = pen_alloc_zero(s->blob.image_count + 1, sizeof *s->images);
+    s->samplers = pen_alloc_zero(s->blob.texture_count + 1, sizeof *s->samplers);
     for (uint32_t i = 0; i < s->blob.image_count; i++) {
         const struct psc_image *image = &s->blob.images[i];
         s->images[i] = gl_texture_create(
@@ -194,11 +189,9 @@ static void make_groups(struct scene *s)
 {
     uint32_t n = s->blob.instance_count;
     uint64_t meshlets = 0;
-    struct sortable *sorted = calloc(n + 1, sizeof *sorted);
-    s->order = calloc(n + 1, sizeof *s->order);
-    s->groups = calloc(n + 1, sizeof *s->groups);
-    if (!sorted || !s->order || !s->groups)
-        abort();
+    struct sortable *sorted = pen_alloc_zero(n + 1, sizeof *sorted);
+    s->order = pen_alloc_zero(n + 1, sizeof *s->order);
+    s->groups = pen_alloc_zero(n + 1, sizeof *s->groups);
     for (uint32_t i = 0; i < n; i++) {
         sorted[i] = (struct sortable){state_key(s, i), i};
         meshlets += s->blob.primitives[s->blob.instances[i].primitive].meshlet_count;
@@ -218,9 +211,7 @@ static void make_groups(struct scene *s)
         s->groups[s->group_count - 1].count++;
     }
     free(sorted);
-    s->command_room = malloc((meshlets + 1) * sizeof *s->command_room);
-    if (!s->command_room)
-        abort();
+    s->command_room = pen_alloc(meshlets + 1, sizeof *s->command_room);
     gl.CreateBuffers(1, &s->commands);
 }
 
@@ -251,9 +242,7 @@ static struct scene *upload(struct scene *s, struct pen_error *error)
 
 static struct scene *create(const uint8_t id[PEN_ID_BYTES])
 {
-    struct scene *s = calloc(1, sizeof *s);
-    if (!s)
-        abort();
+    struct scene *s = pen_alloc_zero(1, sizeof *s);
     memcpy(s->id, id, PEN_ID_BYTES);
     return s;
 }
@@ -383,9 +372,7 @@ uint64_t scene_draw(struct scene *s, const struct cull_view *view, const struct 
     };
     uint32_t total = 0;
     uint64_t triangles = 0;
-    struct run *runs = calloc(s->group_count + 1, sizeof *runs);
-    if (!runs)
-        abort();
+    struct run *runs = pen_alloc_zero(s->group_count + 1, sizeof *runs);
     for (uint32_t g = 0; g < s->group_count; g++) {
         runs[g].first = total;
         for (uint32_t i = 0; i < s->groups[g].count; i++) {

@@ -1,4 +1,5 @@
 #include "tests/gl/fixture.h"
+#include "protocol/fnv.h"
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -60,10 +61,8 @@ uint64_t fixture_render(
     struct pen_frame frame;
     if (!pen_renderer_render(renderer, request, &frame, result, &error))
         die(&error);
-    uint64_t hash = 0xcbf29ce484222325u;
-    const uint8_t *bytes = frame.planes[0].data;
-    for (size_t i = 0; i < (size_t)frame.width * frame.height * 4; i++)
-        hash = (hash ^ bytes[i]) * 0x100000001b3u;
+    uint64_t hash =
+        pen_fnv(PEN_FNV_START, frame.planes[0].data, (size_t)frame.width * frame.height * 4);
     pen_frame_finish(&frame);
     return hash;
 }

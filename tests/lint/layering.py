@@ -4,8 +4,8 @@ import re
 
 import tree
 
-FLOOR_1 = ["protocol/%s.h" % name for name in ("error", "param", "request", "result", "limits",
-                                               "technique_info")]
+FLOOR_1 = ["protocol/%s.h" % name for name in (
+    "error", "fnv", "limits", "memory", "param", "request", "result", "technique_info")]
 PURE = set("""assert ctype errno fenv float inttypes limits locale math stdalign stdarg stdatomic
     stdbool stddef stdint stdio stdlib string strings time""".split())
 SYSTEM = PURE | set("""byteswap dirent dlfcn endian fcntl fnmatch getopt glob immintrin libgen link
@@ -17,7 +17,7 @@ CXX_SHIMS = ["renderer/import/*.cpp", "renderer/encode/*.cpp"]
 
 # pattern of the including file, project headers it may include, headers of libraries, system headers
 RULES = [
-    (r"protocol/(error|param|request|result|limits|technique_info)\.[ch]", FLOOR_1, [], "pure"),
+    (r"protocol/(error|fnv|limits|memory|param|request|result|technique_info)\.[ch]", FLOOR_1, [], "pure"),
     (r"protocol/.*", ["protocol/*"], ["cjson/cJSON.h"], "pure"),
     (r"renderer/blob/.*", FLOOR_1 + ["renderer/blob/*"], [], "system"),
     (r"renderer/generate/.*", FLOOR_1 + ["renderer/blob/*", "renderer/generate/*"],

@@ -1,10 +1,11 @@
+#include "protocol/memory.h"
 #include "renderer/import/convert/accessor.h"
 #include "renderer/import/base/budget.h"
 #include "renderer/import/convert/context.h"
 #include "renderer/import/convert/geometry.h"
-#include "renderer/import/base/memory.h"
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 enum { TRIANGLES = 4, TRIANGLE_STRIP = 5, TRIANGLE_FAN = 6 };
@@ -41,7 +42,7 @@ static void unroll(struct imp_geometry *g, const struct corners *corners, uint32
 {
     uint32_t n = corners->count, out = 0;
     uint32_t triangles = mode == TRIANGLES ? n / 3 : n >= 3 ? n - 2 : 0;
-    g->indices = imp_alloc(3 * (size_t)triangles, sizeof *g->indices);
+    g->indices = pen_alloc_zero(3 * (size_t)triangles, sizeof *g->indices);
     for (uint32_t i = 0; i < triangles; i++) {
         uint32_t a = i, b = i + 1 + i % 2, c = i + 2 - i % 2; /* a strip turns every other one */
         if (mode == TRIANGLES)
@@ -110,14 +111,14 @@ static uint32_t *compact(struct imp_context *context, struct imp_geometry *g, ui
     if (context->stamp_capacity < total) {
         free(context->stamps);
         free(context->stamped);
-        context->stamps = imp_alloc(total, sizeof *context->stamps);
-        context->stamped = imp_alloc(total, sizeof *context->stamped);
+        context->stamps = pen_alloc_zero(total, sizeof *context->stamps);
+        context->stamped = pen_alloc_zero(total, sizeof *context->stamped);
         context->stamp_capacity = total;
         context->stamp = 0;
     }
     uint32_t stamp = ++context->stamp;
     uint32_t most = g->index_count < total ? g->index_count : total;
-    uint32_t *used = imp_alloc(most, sizeof *used);
+    uint32_t *used = pen_alloc_zero(most, sizeof *used);
     g->vertex_count = 0;
     for (uint32_t i = 0; i < g->index_count; i++) {
         uint32_t old = g->indices[i];
@@ -149,7 +150,7 @@ static bool gather(struct imp_context *context, int32_t accessor, uint32_t least
     if (reader.count < total)
         return pen_fail(error, PEN_INVALID, pointer,
             "glTF %s: it has fewer elements than the primitive has vertices.", pointer);
-    float *values = imp_alloc((size_t)count * components, sizeof *values);
+    float *values = pen_alloc_zero((size_t)count * components, sizeof *values);
     *(float **)out = values;
     for (uint32_t i = 0; i < count; i++) {
         float *value = values + (size_t)i * components;

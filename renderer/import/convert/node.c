@@ -1,9 +1,10 @@
+#include "protocol/memory.h"
 #include "renderer/import/convert/accessor.h"
 #include "renderer/blob/affine.h"
 #include "renderer/import/base/budget.h"
 #include "renderer/import/convert/context.h"
-#include "renderer/import/base/memory.h"
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #define LARGEST 1e12 /* of a matrix element; with positions up to 1e12 m all stays finite */
@@ -19,8 +20,8 @@ static bool node_fail(struct pen_error *error, enum pen_code code, uint32_t node
 static bool check_forest(const struct gltf_model *model, struct pen_error *error)
 {
     uint32_t n = model->node_count;
-    uint32_t *parent = imp_alloc(n, sizeof *parent); /* plus 1; 0: none */
-    uint32_t *seen = imp_alloc(n, sizeof *seen);     /* by the climb from this node, plus 1 */
+    uint32_t *parent = pen_alloc_zero(n, sizeof *parent); /* plus 1; 0: none */
+    uint32_t *seen = pen_alloc_zero(n, sizeof *seen);     /* by the climb from this node, plus 1 */
     bool done = true;
     for (uint32_t i = 0; done && i < n; i++)
         for (uint32_t k = 0; done && k < model->nodes[i].child_count; k++) {
@@ -223,8 +224,8 @@ bool imp_add_nodes(struct imp_context *context, struct pen_error *error)
     if (!check_forest(model, error))
         return false;
     struct walk walk = {
-        .context = context, .cameras = imp_alloc(IMP_MAX_LIGHTS + 1, sizeof *walk.cameras)};
-    struct frame *stack = imp_alloc(IMP_MAX_NODE_DEPTH, sizeof *stack);
+        .context = context, .cameras = pen_alloc_zero(IMP_MAX_LIGHTS + 1, sizeof *walk.cameras)};
+    struct frame *stack = pen_alloc_zero(IMP_MAX_NODE_DEPTH, sizeof *stack);
     bool done = true;
     for (uint32_t i = 0; done && i < model->root_count; i++)
         done = walk_tree(&walk, stack, (uint32_t)model->roots[i], error);

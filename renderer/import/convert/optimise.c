@@ -1,6 +1,7 @@
+#include "protocol/memory.h"
 #include "renderer/import/convert/geometry.h"
-#include "renderer/import/base/memory.h"
 #include <meshoptimizer.h>
+#include <stdlib.h>
 
 #define MESHLET_VERTICES 128
 #define CONE_WEIGHT 0.5f
@@ -28,7 +29,7 @@ static void apply_remap(struct imp_geometry *g, const unsigned *remap, size_t ne
     struct stream streams[6];
     unsigned count = list_streams(g, streams);
     for (unsigned i = 0; i < count; i++) {
-        void *moved = imp_alloc(new_count, streams[i].item_bytes);
+        void *moved = pen_alloc_zero(new_count, streams[i].item_bytes);
         meshopt_remapVertexBuffer(
             moved, *streams[i].data, g->vertex_count, streams[i].item_bytes, remap);
         free(*streams[i].data);
@@ -57,9 +58,9 @@ static void build_meshlets(struct imp_geometry *g)
 {
     size_t bound =
         meshopt_buildMeshletsBound(g->index_count, MESHLET_VERTICES, IMP_MESHLET_TRIANGLES);
-    struct meshopt_Meshlet *meshlets = imp_alloc(bound, sizeof *meshlets);
-    unsigned *vertices = imp_alloc(bound, MESHLET_VERTICES * sizeof *vertices);
-    unsigned char *triangles = imp_alloc(bound, IMP_MESHLET_TRIANGLES * 3);
+    struct meshopt_Meshlet *meshlets = pen_alloc_zero(bound, sizeof *meshlets);
+    unsigned *vertices = pen_alloc_zero(bound, MESHLET_VERTICES * sizeof *vertices);
+    unsigned char *triangles = pen_alloc_zero(bound, IMP_MESHLET_TRIANGLES * 3);
     size_t count = meshopt_buildMeshlets(meshlets, vertices, triangles, g->indices, g->index_count,
         g->positions[0], g->vertex_count, sizeof *g->positions, MESHLET_VERTICES,
         IMP_MESHLET_TRIANGLES, CONE_WEIGHT);
@@ -67,7 +68,7 @@ static void build_meshlets(struct imp_geometry *g)
     for (size_t i = 0; i < count; i++)
         covered += meshlets[i].triangle_count;
     if (covered * 3 == g->index_count) {
-        g->meshlet_triangles = imp_alloc(count, sizeof *g->meshlet_triangles);
+        g->meshlet_triangles = pen_alloc_zero(count, sizeof *g->meshlet_triangles);
         g->meshlet_count = (uint32_t)count;
         uint32_t *out = g->indices;
         for (size_t i = 0; i < count; i++) {
@@ -94,7 +95,7 @@ static uint64_t crowding(const struct imp_geometry *g, unsigned *remap)
 {
     size_t places = meshopt_generateVertexRemap(
         remap, g->indices, g->index_count, g->positions, g->vertex_count, sizeof *g->positions);
-    uint32_t *corners = imp_alloc(places, sizeof *corners);
+    uint32_t *corners = pen_alloc_zero(places, sizeof *corners);
     for (uint32_t i = 0; i < g->index_count; i++)
         corners[remap[g->indices[i]]]++;
     uint64_t sum = 0;
@@ -106,7 +107,7 @@ static uint64_t crowding(const struct imp_geometry *g, unsigned *remap)
 
 void imp_geometry_optimise(struct imp_geometry *g, uint64_t *work)
 {
-    unsigned *remap = imp_alloc(g->vertex_count, sizeof *remap);
+    unsigned *remap = pen_alloc_zero(g->vertex_count, sizeof *remap);
     weld(g, remap);
     uint64_t crowd = crowding(g, remap);
     if (crowd <= *work) {

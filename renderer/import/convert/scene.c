@@ -1,18 +1,12 @@
+#include "protocol/fnv.h"
+#include "protocol/memory.h"
 #include "renderer/import/base/budget.h"
 #include "renderer/import/convert/context.h"
-#include "renderer/import/base/memory.h"
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
-
-static uint64_t hash(const char *text) /* FNV-1a */
-{
-    uint64_t h = 0xcbf29ce484222325u;
-    for (; *text; text++)
-        h = (h ^ (uint8_t)*text) * 0x100000001b3u;
-    return h;
-}
 
 void imp_warn(struct imp_context *context, const char *format, ...)
 {
@@ -21,7 +15,7 @@ void imp_warn(struct imp_context *context, const char *format, ...)
     va_start(args, format);
     vsnprintf(text, sizeof text, format, args);
     va_end(args);
-    uint64_t h = hash(text);
+    uint64_t h = pen_fnv(PEN_FNV_START, text, strlen(text));
     for (uint32_t i = 0; i < context->warned_count; i++)
         if (context->warned[i] == h)
             return;
@@ -33,7 +27,7 @@ void imp_warn(struct imp_context *context, const char *format, ...)
 
 static uint32_t *not_yet(size_t count)
 {
-    uint32_t *numbers = imp_alloc(count, sizeof *numbers);
+    uint32_t *numbers = pen_alloc_zero(count, sizeof *numbers);
     memset(numbers, 0xff, count * sizeof *numbers);
     return numbers;
 }
@@ -48,11 +42,12 @@ bool imp_convert(struct imp_document *document, struct gltf_model *model,
         .primitives = not_yet(model->primitive_count),
         .materials = not_yet((size_t)model->material_count + 1),
         .textures = not_yet(2 * (size_t)model->texture_count),
-        .image_slots = imp_alloc(2 * (size_t)document->image_count, sizeof(struct imp_image_slot)),
+        .image_slots =
+            pen_alloc_zero(2 * (size_t)document->image_count, sizeof(struct imp_image_slot)),
         .bounds_min = {INFINITY, INFINITY, INFINITY},
         .bounds_max = {-INFINITY, -INFINITY, -INFINITY},
-        .primitive_bounds = imp_alloc(model->primitive_count, sizeof(struct primitive_bounds)),
-        .warned = imp_alloc(IMP_MAX_WARNINGS, sizeof(uint64_t))};
+        .primitive_bounds = pen_alloc_zero(model->primitive_count, sizeof(struct primitive_bounds)),
+        .warned = pen_alloc_zero(IMP_MAX_WARNINGS, sizeof(uint64_t))};
     bool done = false;
     if (model->primitive_count > IMP_MAX_PRIMITIVES) {
         pen_fail(error, PEN_TOO_BIG, "", "The glTF has %u primitives; %u are allowed.",

@@ -1,9 +1,10 @@
+#include "protocol/memory.h"
 #include "renderer/import/base/budget.h"
 #include "renderer/import/convert/context.h"
 #include "renderer/import/image/image.h"
-#include "renderer/import/base/memory.h"
 #include "renderer/import/base/text.h"
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 
@@ -136,7 +137,7 @@ static bool plan_images(struct imp_context *context, struct plan *plans, struct 
 
 bool imp_add_images(struct imp_context *context, struct pen_error *error)
 {
-    struct plan *plans = imp_alloc(context->image_slot_count, sizeof *plans);
+    struct plan *plans = pen_alloc_zero(context->image_slot_count, sizeof *plans);
     bool done = plan_images(context, plans, error);
     for (uint32_t i = 0; done && i < context->image_slot_count; i++) {
         const struct imp_image_slot *slot = &context->image_slots[i];

@@ -1,10 +1,11 @@
 #include "renderer/import/document/document.h"
+#include "protocol/memory.h"
 #include "renderer/import/base/budget.h"
-#include "renderer/import/base/memory.h"
 #include "renderer/import/document/schema.h"
 #include "renderer/import/base/text.h"
 #include <cjson/cJSON.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #define GLB_JSON 0x4e4f534au
@@ -95,7 +96,7 @@ static bool open_buffers(struct imp_document *document, struct imp_bytes bin,
 {
     const cJSON *items = cJSON_GetObjectItemCaseSensitive(document->root, "buffers"), *item;
     document->buffer_count = (uint32_t)cJSON_GetArraySize(items);
-    document->buffers = imp_alloc(document->buffer_count, sizeof *document->buffers);
+    document->buffers = pen_alloc_zero(document->buffer_count, sizeof *document->buffers);
     uint32_t i = 0;
     cJSON_ArrayForEach(item, items)
     {
@@ -124,7 +125,7 @@ static bool open_views(struct imp_document *document, struct pen_error *error)
 {
     const cJSON *items = cJSON_GetObjectItemCaseSensitive(document->root, "bufferViews"), *item;
     document->view_count = (uint32_t)cJSON_GetArraySize(items);
-    document->views = imp_alloc(document->view_count, sizeof *document->views);
+    document->views = pen_alloc_zero(document->view_count, sizeof *document->views);
     uint32_t i = 0;
     cJSON_ArrayForEach(item, items)
     {
@@ -161,7 +162,7 @@ static bool open_images(struct imp_document *document, struct imp_files *files, 
 {
     const cJSON *items = cJSON_GetObjectItemCaseSensitive(document->root, "images"), *item;
     document->image_count = (uint32_t)cJSON_GetArraySize(items);
-    document->images = imp_alloc(document->image_count, sizeof *document->images);
+    document->images = pen_alloc_zero(document->image_count, sizeof *document->images);
     uint32_t i = 0;
     cJSON_ArrayForEach(item, items)
     {
@@ -241,9 +242,8 @@ void imp_document_finish(struct imp_document *document)
 
 uint8_t *imp_document_alloc(struct imp_document *document, size_t bytes)
 {
-    uint32_t n = document->owned_count;
-    if (!(n & (n - 1))) /* full at each power of two */
-        document->owned = imp_realloc(document->owned, n ? 2 * n : 1, sizeof *document->owned);
-    document->owned[document->owned_count++] = imp_alloc(bytes, 1);
-    return document->owned[n];
+    uint8_t *memory = pen_alloc_zero(bytes, 1);
+    document->owned = pen_grow(document->owned, &document->owned_capacity,
+        document->owned_count + 1, sizeof *document->owned);
+    return document->owned[document->owned_count++] = memory;
 }

@@ -29,7 +29,7 @@ struct imp_document {
     char *text; /* for tinygltf: without buffers, images, animations, skins */
     size_t text_bytes;
     uint8_t **owned; /* unpacked memory */
-    uint32_t owned_count;
+    size_t owned_count, owned_capacity;
 };
 
 /* `data` is a .glb or .gltf and must outlive *document, as must `files` (the other files of the

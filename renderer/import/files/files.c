@@ -1,8 +1,9 @@
 #include "renderer/import/files/files.h"
+#include "protocol/memory.h"
 #include "renderer/import/base/budget.h"
 #include "renderer/import/bundle.h"
-#include "renderer/import/base/memory.h"
 #include "renderer/import/base/text.h"
+#include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 #include <zip.h>
@@ -31,7 +32,7 @@ bool imp_name_is_safe(const char *name, size_t bytes)
 
 static char *copy_name(const char *name, size_t bytes)
 {
-    char *copy = imp_alloc(bytes + 1, 1);
+    char *copy = pen_alloc_zero(bytes + 1, 1);
     memcpy(copy, name, bytes);
     return copy;
 }
@@ -61,7 +62,7 @@ static bool bundle_table(
     if (!count || count > PEN_BUNDLE_MAX_ENTRIES)
         return pen_fail(error, PEN_TOO_BIG, "", "A bundle holds 1 to %d files, not %u.",
             PEN_BUNDLE_MAX_ENTRIES, count);
-    files->items = imp_alloc(count, sizeof *files->items);
+    files->items = pen_alloc_zero(count, sizeof *files->items);
     size_t at = 16;
     for (uint32_t i = 0; i < count; i++) {
         uint32_t name_bytes;
@@ -113,7 +114,7 @@ static bool zip_table(
         return pen_fail(error, count < 1 ? PEN_INVALID : PEN_TOO_BIG, "",
             "The zip file holds %lld entries; 1 to %d are allowed.", (long long)count,
             PEN_BUNDLE_MAX_ENTRIES);
-    files->items = imp_alloc((size_t)count, sizeof *files->items);
+    files->items = pen_alloc_zero((size_t)count, sizeof *files->items);
     uint64_t unpacked = 0; /* if the table tells the truth; unpack() allows no more */
     for (zip_int64_t i = 0; i < count; i++) {
         zip_stat_t entry;
@@ -212,7 +213,7 @@ static bool unpack(struct imp_files *files, struct imp_file *file, struct pen_er
         return pen_fail(error, PEN_INVALID, "",
             "\"%s\" cannot be unpacked: its method is not supported or the zip is damaged.",
             imp_text(file->name).s);
-    file->owned = imp_alloc(file->bytes + 1, 1);
+    file->owned = pen_alloc_zero(file->bytes + 1, 1);
     /* Reading on to the end, and one byte past the size that was told, is what checks the CRC. */
     uint64_t got = 0;
     zip_int64_t n;

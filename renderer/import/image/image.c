@@ -1,7 +1,8 @@
 #include "renderer/import/image/image.h"
+#include "protocol/memory.h"
 #include "renderer/import/base/budget.h"
-#include "renderer/import/base/memory.h"
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 enum imp_image_kind imp_image_sniff(struct imp_bytes data)
@@ -63,7 +64,7 @@ bool imp_image_decode(struct imp_bytes data, uint32_t width, uint32_t height, ui
     size_t bytes = 4 * (size_t)width * height;
     bool done = false;
     *damaged = false;
-    *rgba = imp_alloc(bytes, 1);
+    *rgba = pen_alloc_zero(bytes, 1);
     switch (imp_image_sniff(data)) {
     case IMP_PNG:
         done = imp_png_decode(data, *rgba, bytes);

@@ -1,4 +1,5 @@
 #include "renderer/passes/light/light_bits.h"
+#include "protocol/memory.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -71,10 +72,8 @@ void light_bits_fit(struct light_bits *bits, uint32_t count, uint32_t shape, boo
     bits->below = gl_texture_create(
         words > 4 ? GL_RGBA32UI : GL_RG32UI, width, height, words > 4 ? words / 4 : 1, 1);
     bits->at = gl_texture_create(GL_RG32F, count, patterns, 0, 1);
-    float *points = malloc(sizeof(float) * 2 * count * patterns);
-    uint32_t *table = calloc((size_t)width * height * words, sizeof *table);
-    if (!points || !table)
-        abort();
+    float *points = pen_alloc(2 * count * patterns, sizeof *points);
+    uint32_t *table = pen_alloc_zero((size_t)width * height * words, sizeof *table);
     for (uint32_t i = 0; i < count * patterns; i++)
         make_point(bits, i / count, i % count, points + 2 * i);
     for (uint32_t row = 0; row < height; row++)

@@ -1,4 +1,5 @@
 #include "renderer/passes/map/classify.h"
+#include "protocol/memory.h"
 #include <stdlib.h>
 
 struct classify_block {
@@ -10,9 +11,7 @@ struct classify_block {
 static void count_classes(struct technique_run *run, const struct gl_texture *tiles)
 {
     uint32_t n = tiles->width * tiles->height;
-    uint8_t(*found)[2] = malloc(2 * n); /* class, receivers */
-    if (!found)
-        abort();
+    uint8_t(*found)[2] = pen_alloc(2 * n, 1); /* class, receivers */
     gl.PixelStorei(GL_PACK_ALIGNMENT, 1);
     gl.GetTextureImage(tiles->name, 0, GL_RG, GL_UNSIGNED_BYTE, (GLsizei)(2 * n), found);
     for (uint32_t i = 0; i < n; i++) {

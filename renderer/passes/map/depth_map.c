@@ -1,3 +1,4 @@
+#include "protocol/memory.h"
 #include "renderer/passes/draw/passes.h"
 #include <cglm/cglm.h>
 #include <stdlib.h>
@@ -49,9 +50,7 @@ static bool draw(struct technique_run *run, GLuint framebuffer, uint32_t size,
     gl.Enable(GL_DEPTH_CLAMP); /* casters nearer than the near plane still cast */
     bool *hidden = NULL;
     if (!backdrops) {
-        hidden = calloc(run->scene->blob.instance_count + 1, sizeof *hidden);
-        if (!hidden)
-            abort();
+        hidden = pen_alloc_zero(run->scene->blob.instance_count + 1, sizeof *hidden);
         light_find_backdrops(run->light, run->scene, hidden);
         pass.hidden = hidden;
     }

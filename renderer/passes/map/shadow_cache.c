@@ -1,4 +1,5 @@
 #include "renderer/passes/map/shadow_cache.h"
+#include "protocol/memory.h"
 #include <stdlib.h>
 #include <string.h>
 
@@ -26,9 +27,7 @@ struct shadow_cache {
 
 struct shadow_cache *shadow_cache_create(void)
 {
-    struct shadow_cache *cache = calloc(1, sizeof *cache);
-    if (!cache)
-        abort();
+    struct shadow_cache *cache = pen_alloc_zero(1, sizeof *cache);
     return cache;
 }
 
@@ -76,9 +75,7 @@ const struct shadow_input *shadow_cache_get(struct technique_run *run, const str
             e->last_frame = cache->frame;
             return &e->input;
         }
-    struct entry *e = calloc(1, sizeof *e);
-    if (!e)
-        abort();
+    struct entry *e = pen_alloc_zero(1, sizeof *e);
     e->scene = run->scene;
     e->face = face;
     e->key = *key;

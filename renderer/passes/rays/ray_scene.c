@@ -1,4 +1,5 @@
 #include "renderer/passes/rays/ray_scene.h"
+#include "protocol/memory.h"
 #include "renderer/passes/rays/ray_alpha.h"
 #include <math.h>
 #include <stdlib.h>
@@ -41,9 +42,7 @@ static bool upload_all(struct technique_run *run, const struct pen_bvh *bvh,
             "allowed.",
             (double)bytes / (1 << 20), (double)scene->bytes / (1 << 20),
             (double)run->ctx->gpu_memory / (1 << 20));
-    struct ray_scene *s = calloc(1, sizeof *s);
-    if (!s)
-        abort();
+    struct ray_scene *s = pen_alloc_zero(1, sizeof *s);
     s->nodes = upload(bvh->nodes, nodes);
     s->triangles = upload(bvh->triangles, triangles);
     if (records) {

@@ -1,4 +1,5 @@
 /* Rays on the CPU: read the receivers back, trace, upload. */
+#include "protocol/memory.h"
 #include "renderer/passes/rays/rays.h"
 #include <stdlib.h>
 #include <string.h>
@@ -17,21 +18,13 @@ static struct pen_trace_scene *trace_scene(struct scene *scene, struct pen_error
     return scene->trace;
 }
 
-static void *room(size_t bytes)
-{
-    void *data = malloc(bytes);
-    if (!data)
-        abort();
-    return data;
-}
-
 /* The emission texture as floats; freed by the caller. */
 static float *read_emission(const struct technique_run *run, struct pen_trace_light *light)
 {
     if (!run->face->textured)
         return NULL;
     size_t bytes = (size_t)run->emission->width * run->emission->height * 16;
-    float *texels = room(bytes);
+    float *texels = pen_alloc(bytes, 1);
     gl.GetTextureImage(run->emission->name, 0, GL_RGBA, GL_FLOAT, (GLsizei)bytes, texels);
     light->emission = texels;
     light->columns = run->emission->width, light->rows = run->emission->height;
@@ -61,8 +54,8 @@ bool pass_rays_host(struct technique_run *run, const struct ray_job *job, struct
     if (!scene || !ray_receivers(run, t, error))
         return false;
     size_t count = (size_t)run->width * run->height;
-    float *positions = room(16 * count), *normals = room(16 * count);
-    float *visibility = room(16 * count), *standard_error = room(4 * count);
+    float *positions = pen_alloc(count, 16), *normals = pen_alloc(count, 16);
+    float *visibility = pen_alloc(count, 16), *standard_error = pen_alloc(count, 4);
     struct pen_trace_light light = ray_light(run);
     float *emission = read_emission(run, &light);
     struct pen_trace_job trace = {.positions = positions,

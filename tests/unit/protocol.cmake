@@ -1,0 +1,1 @@
+penumbra_unit_test(memory memory.c LIBS penumbra_protocol)

@@ -12,8 +12,8 @@ struct reader {
     struct pen_error *error;
 };
 
-/* "/technique/params/x" of the request that stands for one method becomes "/techniques/3/params/x".
- */
+/* "/technique/params/x" of the request that stands for one
+ * method becomes "/techniques/3/params/x". */
 static bool move_pointer(struct pen_error *error, const char *to)
 {
     static const char from[] = "/technique";

@@ -17,8 +17,8 @@ struct pen_compare {
  *                 32 methods, each a name or {"name", "params"}
  *   "reference"   a method; default: "raytraced" with 1024 samples, or "multisample" with 1024
  *                 where the build has no "raytraced", and then a warning
- * Errors as pen_request_from_json. Methods in `excluded` (by name, may be NULL) cannot be compared.
- */
+ * Errors as pen_request_from_json. Methods in `excluded` (by name, may be NULL)
+ * cannot be compared. */
 bool pen_compare_from_json(const char *text, size_t bytes, const struct pen_catalogue *catalogue,
     const char *excluded, struct pen_compare *compare, struct pen_error *error);
 

@@ -35,8 +35,8 @@ char *pen_result_json(const struct pen_result *result, const struct pen_record_e
 void pen_result_write_device(struct pen_json *json, const struct pen_device_info *device);
 void pen_result_write_times(struct pen_json *json, const struct pen_result *result);
 
-/* The Server-Timing header's value, "queue;dur=0.1, load;dur=0, ..."; at most `bytes` with the NUL.
- */
+/* The Server-Timing header's value, "queue;dur=0.1, load;dur=0, ..."; at most `bytes`
+ * with the NUL. */
 void pen_server_timing(const struct pen_result *result, double total_ms, char *text, size_t bytes);
 
 /* application/problem+json (RFC 9457). `request_id` may be NULL. */

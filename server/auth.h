@@ -4,8 +4,7 @@
 #include <stdint.h>
 
 struct auth;
-/* Errors: PEN_UNAVAILABLE (unreadable), PEN_INVALID (no token, a token under 16 characters).
- */
+/* Errors: PEN_UNAVAILABLE (unreadable), PEN_INVALID (no token, a token under 16 characters). */
 struct auth *auth_load(const char *path, struct pen_error *error);
 void auth_destroy(struct auth *auth); /* NULL is fine */
 /* The number, from 1, of the token that an Authorization header carries; 0: none of them. The time

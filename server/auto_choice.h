@@ -79,10 +79,12 @@ void auto_observe(struct auto_observed *observed, double expected_ms, double ms)
  * when it has become faster. */
 double auto_correction(const struct auto_observed *own, const struct auto_observed *all);
 
-/* max_rmse: the cheapest row that stays below it with a quarter to spare. budget_ms: the most
- * accurate row whose expected time leaves a fifth of the budget free (three eighths of it when the
- * table is that of another view). Both: the cheapest that does
- * both. Nothing does: the most accurate row within the budget, else the fastest; without a budget
- * the most accurate one. False when the table is empty. */
+/* What is taken:
+ *   max_rmse    the cheapest row that stays below it with a quarter to spare
+ *   budget_ms   the most accurate row whose expected time leaves a fifth of the budget free (three
+ *               eighths of it when the table is that of another view)
+ *   both        the cheapest that does both
+ * Nothing does: the most accurate row within the budget, else the fastest; without a budget the
+ * most accurate one. False when the table is empty. */
 bool auto_choose(const struct auto_table *table, const struct auto_wish *wish, uint64_t pixels,
     struct auto_pick *pick);

@@ -16,8 +16,8 @@ struct compare_plan {
     /* Called before every request but the first; false leaves it out. May be NULL. */
     bool (*wants)(void *owner, struct compare *compare, uint32_t request);
     bool (*is_gone)(void *owner); /* the client has hung up; may be NULL */
-    /* Called once, from any thread. PEN_OK: the measurements are there. Ends with
-     * compare_destroy. */
+    /* Called once, from any thread. PEN_OK: the measurements are there.
+     * Ends with compare_destroy. */
     void (*done)(void *owner, struct compare *compare, const struct pen_error *error,
         uint32_t retry_after_s);
     void *owner;

@@ -220,8 +220,8 @@ static enum MHD_Result queue(struct http_exchange *x)
     return result;
 }
 
-/* In the middle of a body libmicrohttpd takes no answer: it is written past it, and the connection
- * ends. */
+/* In the middle of a body libmicrohttpd takes no answer: it is written past it, and
+ * the connection ends. */
 static enum MHD_Result break_off(struct http_exchange *x)
 {
     struct http_listener *listener = x->listener;

@@ -12,9 +12,9 @@ struct picture {
     unsigned references; /* atomic */
 };
 
-/* Maps the memfd (which stays the caller's). Without a tag the bytes' own hash is taken. Errors:
- * PEN_INTERNAL when it is not sealed or not as long as the record says. The caller owns one
- * reference. */
+/* Maps the memfd (which stays the caller's). Without a tag the bytes' own hash is taken.
+ * Errors: PEN_INTERNAL when it is not sealed or not as long as the record says. The caller
+ * owns one reference. */
 struct picture *picture_create(
     int memfd, const struct pen_result *result, const char *tag, struct pen_error *error);
 struct picture *picture_reference(struct picture *picture);

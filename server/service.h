@@ -49,8 +49,8 @@ struct service *service_create(
 void service_destroy(struct service *service, const bool *hurry);
 
 bool service_is_draining(const struct service *service);
-/* Why it is not ready (a constant sentence), or NULL: it is, as far as can be told without a test
- * render. */
+/* Why it is not ready (a constant sentence), or NULL: it is, as far as can be told without
+ * a test render. */
 const char *service_obstacle(struct service *service);
 /* The device, once a worker has told. */
 bool service_device(struct service *service, struct pen_device_info *device);

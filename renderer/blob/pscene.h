@@ -57,9 +57,10 @@ struct psc_attributes {
 struct psc_meshlet {
     uint32_t first_index, index_count;
     float center[3], radius; /* bounding sphere, object space */
-    float cone_axis[3]; /* normal cone: every triangle faces away from the direction v (unit, */
-    float cone_cutoff;  /* eye to centre) when dot(v, axis) >= cutoff; cutoff > 1: never.
-                           For a perspective eye add radius/distance to cutoff. */
+    /* Normal cone: every triangle faces away from the direction v (unit, eye to centre) when
+     * dot(v, axis) >= cutoff; cutoff > 1: never. For a perspective eye add radius / distance to
+     * the cutoff. */
+    float cone_axis[3], cone_cutoff;
 };
 
 enum psc_primitive_flags { PSC_WATERTIGHT = 1 }; /* every edge is shared by exactly two triangles */

@@ -7,8 +7,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Direction of growing u (unit) and the sign of the uv area; false when uv or positions span none.
- */
+/* Direction of growing u (unit) and the sign of the uv area; false when uv or
+ * positions span none. */
 static bool triangle_tangent(
     const struct geometry *g, const uint32_t *t, double tangent[3], int *side)
 {

@@ -1,17 +1,23 @@
 /* Image files from finished frames. Thread-safe: no state between calls. C++ stays behind it.
  *
- * What each format takes from a plane (see pen_encode_wants for what a renderer should deliver):
- *   PNG and TIFF   8 bit from PEN_PIXEL_RGBA8 as it is; 16 bit from PEN_PIXEL_RGBA32F (or 16F)
- * whose values are ALREADY display-encoded in [0, 1]: they are only quantised, round to nearest.
- * The renderer tone-maps and encodes; this module never does. JPEG, WebP     PEN_PIXEL_RGBA8; alpha
- * is dropped from JPEG; WebP at quality 100 is lossless. EXR            PEN_PIXEL_RGBA16F or
- * RGBA32F, scene-linear. Bit depth 16: half, 32: float, 0: each plane in the precision in which it
- * was delivered. All but EXR write planes[0] only. EXR names the channels of a single plane R G B A
- * (one channel: Y, the depth plane: Z); several planes are layers of one part: the plane "beauty"
- * keeps R G B A, the others are <plane>.R .G .B .A, <plane>.X .Y .Z for normal and position,
- * depth.Z, <plane>.Y. Channels: 1 is written as grey, 3 as RGB, 4 as RGBA; alpha is unassociated
- * and stored unchanged. NaN is written as 0, infinities as the largest finite value of the target.
- */
+ * What each format takes from a plane (pen_encode_wants says what a renderer should deliver):
+ *   PNG, TIFF    8 bit: PEN_PIXEL_RGBA8 as it is. 16 bit: PEN_PIXEL_RGBA32F (or 16F) whose values
+ *                are already display-encoded in [0, 1]; they are only quantised, round to nearest
+ *   JPEG, WebP   PEN_PIXEL_RGBA8; JPEG drops alpha, WebP at quality 100 is lossless
+ *   EXR          PEN_PIXEL_RGBA16F or RGBA32F, scene-linear. Bit depth 16: half, 32: float, 0: each
+ *                plane in the precision in which it was delivered
+ * The renderer tone-maps and display-encodes; this module never does.
+ *
+ * All but EXR write planes[0] only. EXR calls the channels of a single plane R G B A (one channel:
+ * Y, the depth plane: Z). Several planes are layers of one part: "beauty" keeps R G B A, the others
+ * are
+ *   <plane>.R .G .B .A
+ *   <plane>.X .Y .Z      normal and position
+ *   depth.Z
+ *   <plane>.Y            one channel
+ *
+ * One channel is written as grey, three as RGB, four as RGBA; alpha is unassociated and stored
+ * unchanged. NaN is written as 0, infinities as the largest finite value of the target. */
 #pragma once
 #include "renderer/renderer.h"
 

@@ -66,8 +66,8 @@ void describe(const struct oiio_file *file, OIIO::ImageSpec &spec)
     /* After the caller's, so that none of these can be overridden by a key. */
     spec.attribute(
         "oiio:UnassociatedAlpha", 1); /* alpha is data here: never multiplied or divided */
-    /* The writers add the current time where there is none; a value that is no text keeps it out.
-     */
+    /* The writers add the current time where there is none; a value that is no text
+     * keeps it out. */
     void *none = nullptr;
     spec.attribute("DateTime", OIIO::TypeDesc::PTR, &none);
     if (file->compression)

@@ -4,8 +4,8 @@
 #include <string.h>
 #include <webp/encode.h>
 
-/* 0 (fast) to 6 (small). Lossless: WebP's level 1, at 2 the time grows faster than the file
- * shrinks. */
+/* 0 (fast) to 6 (small). Lossless: WebP's level 1, at 2 the time grows faster than
+ * the file shrinks. */
 #define METHOD_LOSSY 2
 #define LEVEL_LOSSLESS 1
 

@@ -1,6 +1,6 @@
-/* Scenes whose visibility is known in closed form (T1 to T7). Every one has a receiver at y = 0
- * that is at least as wide as its half-plane casters, so that below a caster no light passes
- * outside. */
+/* Scenes whose visibility is known in closed form (T1 to T7). Every one has a receiver at
+ * y = 0 that is at least as wide as its half-plane casters, so that below a caster no
+ * light passes outside. */
 #include "protocol/memory.h"
 #include "renderer/generate/model.h"
 #include <math.h>
@@ -42,8 +42,8 @@ static uint32_t star_image(struct model *model)
             double px = 2 * (x + 0.5) / side - 1, py = 1 - 2 * (y + 0.5) / side;
             double r = hypot(px, py), angle = atan2(px, py);    /* one point straight up */
             double part = fabs(remainder(angle, 2 * M_PI / 5)); /* 0 at a point, pi/5 between */
-            /* The edge from the tip (radius 0.95) to the notch (0.4, at pi/5), as a straight line.
-             */
+            /* The edge from the tip (radius 0.95) to the notch (0.4, at pi/5), as
+             * a straight line. */
             double nx = 0.4 * sin(M_PI / 5), ny = 0.4 * cos(M_PI / 5), tip = 0.95;
             double qx = r * sin(part), qy = r * cos(part);
             bool inside = nx * (qy - tip) - (ny - tip) * qx < 0 && r > 0.18;

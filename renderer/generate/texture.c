@@ -142,8 +142,8 @@ uint32_t texture_stone_normal(struct model *model, uint32_t side)
     return normal_map(model, side, stone_height, 0.02);
 }
 
-/* Pointed oval with a serrated edge; colour continues outside, so that no dark rim is filtered in.
- */
+/* Pointed oval with a serrated edge; colour continues outside, so that no dark rim
+ * is filtered in. */
 uint32_t texture_leaf(struct model *model, uint32_t side)
 {
     uint8_t *rgba = pen_alloc(side * side, 4);

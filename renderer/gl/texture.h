@@ -20,8 +20,8 @@ void gl_texture_destroy(struct gl_texture *texture);
 bool gl_texture_fit(struct gl_texture *texture, GLenum format, uint32_t width, uint32_t height,
     uint32_t layers, uint32_t levels);
 
-/* A framebuffer with these colour attachments (level 0, or one layer of an array when layer >= 0).
- */
+/* A framebuffer with these colour attachments (level 0, or one layer of an array when
+ * layer >= 0). */
 GLuint gl_framebuffer_create(
     const struct gl_texture *const *colors, uint32_t count, const struct gl_texture *depth);
 

@@ -7,8 +7,7 @@
 
 enum pen_import_mode {
     PEN_IMPORT_SCENE, /* glTF binary, glTF JSON with data URIs, zip, bundle */
-    PEN_IMPORT_IMAGE, /* PNG, JPEG or WebP -> a blob with one sRGB image, one texture, no geometry
-                       */
+    PEN_IMPORT_IMAGE, /* PNG, JPEG or WebP: a blob with one sRGB image, one texture, no geometry */
 };
 
 /* `source` is the SHA-256 that the blob will carry. On success *blob (the caller frees it) holds a

@@ -4,8 +4,8 @@
 #include "protocol/error.h"
 
 struct pen_sandbox_limits {
-    uint64_t
-        memory_bytes; /* address space beyond what is mapped at entry; ignored under ASan, TSan */
+    /* Address space beyond what is mapped at entry; ignored under ASan and TSan. */
+    uint64_t memory_bytes;
     uint64_t output_bytes; /* largest size of a file written to */
     uint32_t cpu_seconds;  /* SIGXCPU then, SIGKILL a second later */
 };

@@ -2,8 +2,8 @@
 #pragma once
 #include "protocol/error.h"
 
-/* Rows top first, `stride` floats from one pixel to the next; `data` points at the first channel.
- */
+/* Rows top first, `stride` floats from one pixel to the next; `data` points at
+ * the first channel. */
 struct pen_metrics_image {
     const float *data;
     uint32_t width, height, stride;

@@ -1,5 +1,5 @@
-/* The points of a light that shadow rays aim at: one set for the CPU and for shaders. No GL, no
- * Embree. */
+/* The points of a light that shadow rays aim at: one set for the CPU and for shaders. No
+ * GL, no Embree. */
 #pragma once
 #include "protocol/error.h"
 #include <stdbool.h>

@@ -96,10 +96,9 @@ struct pen_trace_result { /* each array: width * height, or NULL when not wanted
     /* rgb: mean over the light of e V, a: mean of V (G: both means weighted by G). V = 0 for light
      * points behind the receiver's plane and for receivers behind a one-sided emitter. */
     float *visibility; /* RGBA */
-    /* Estimated standard error of a. 0: all samples agreed (then the error is of order 1 /
-     * samples). Estimated from the difference of the two samples in each half-resolution stratum,
-     * which is unbiased for two samples per stratum and so slightly too large for the finer net we
-     * use. */
+    /* Estimated standard error of a; 0: all samples agreed, and it is of order 1 / samples. It
+     * comes from the difference of the two samples in each half-resolution stratum, which is
+     * unbiased for two samples per stratum and so slightly too large for the finer net we use. */
     float *standard_error;
     uint32_t *samples; /* spent on each receiver, pre-test not counted */
 };

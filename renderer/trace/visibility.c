@@ -308,8 +308,8 @@ static bool check_job(
     return true;
 }
 
-/* The adaptive mode's first half: settles what the pre-test settles and leaves the rest in `full`.
- */
+/* The adaptive mode's first half: settles what the pre-test settles and leaves the
+ * rest in `full`. */
 static bool select_receivers(
     struct run *run, uint32_t threads, uint32_t tiles, double *cpu_seconds, struct pen_error *error)
 {

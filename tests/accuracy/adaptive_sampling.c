@@ -1,5 +1,5 @@
-/* Adaptive light source subdivision: where it splits, what it converges to, both ways of counting.
- */
+/* Adaptive light source subdivision: where it splits, what it converges to, both
+ * ways of counting. */
 #include "renderer/passes/light/light_tree.h"
 #include "tests/accuracy/textured.h"
 #include "tests/unit/check.h"
@@ -50,8 +50,8 @@ static void check_no_caster(void)
     }
 }
 
-/* Samples of the tree whose quads are split wherever the line u = cut (of [0, 1]) runs through
- * them. */
+/* Samples of the tree whose quads are split wherever the line u = cut (of [0, 1])
+ * runs through them. */
 static uint32_t samples_along(double cut, uint32_t levels)
 {
     struct light_tree tree;
@@ -90,8 +90,8 @@ static void check_edge(void)
         CHECK(expected == mirrored); /* so the light's x axis may point either way */
         CHECK(shot->result.shadow_maps == expected);
         CHECK(expected < 150);
-        /* Columns of equal weight on both sides of the cut, half of the one that it runs through.
-         */
+        /* Columns of equal weight on both sides of the cut, half of the one that
+         * it runs through. */
         for (uint32_t k = 0; k < shot->width * shot->height; k++)
             CHECK_NEAR(shot->visibility[4 * k + 3], 1 - cuts[i], 1.0 / 32 + 1e-3);
         CHECK(shots[1].result.shadow_maps == shot->result.shadow_maps);

@@ -228,8 +228,8 @@ static void check_stacked(void)
     }
 }
 
-/* Every kind of light against an average of hard shadows; the square leaves no doubt about layers.
- */
+/* Every kind of light against an average of hard shadows; the square leaves no
+ * doubt about layers. */
 static void check_lights(void)
 {
     static const struct {

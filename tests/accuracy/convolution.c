@@ -87,9 +87,9 @@ static double mean_over_edge(const struct shot *shot)
     return sum / n;
 }
 
-/* The filter averages tests: a symmetric kernel over an edge keeps the sum of both sides. The hard
- * shadow of the same map says where its texels put the edge. Damped so far that nothing is clamped.
- */
+/* The filter averages tests: a symmetric kernel over an edge keeps the sum of both sides.
+ * The hard shadow of the same map says where its texels put the edge. Damped so far that
+ * nothing is clamped. */
 static void check_linearity(void)
 {
 #define FINE_VIEW                                                                                  \
@@ -198,9 +198,9 @@ static void check_leaks(const char *method)
     harness_shot_finish(&shot);
 }
 
-/* Two planes in one window: the width tells the blocker average, and 5 % of it are 0.02 of the
- * depth range here. Without the offset lit texels count as half a blocker each, and it must fail.
- */
+/* Two planes in one window: the width tells the blocker average, and 5 % of it are 0.02
+ * of the depth range here. Without the offset lit texels count as half a blocker each,
+ * and it must fail. */
 static double two_plane_width_error(const char *method)
 {
     char settings[512];
@@ -228,9 +228,9 @@ int main(void)
     check_leaks("technique=cssm&storage=tables");
     check_leaks("technique=cssm");
     check_leaks("technique=cssm&terms=8&damping=1&offset=0.5");
-    /* With mips the sum of few kernels is no box: from one and the same average, 2, 3, 5 and 6
-     * lookups an axis make widths of -1, -6, 0 and +2 %. Five show the average, three are the
-     * default. */
+    /* With mips the sum of few kernels is no box: from one and the same average, 2, 3, 5
+     * and 6 lookups an axis make widths of -1, -6, 0 and +2 %. Five show the average, three
+     * are the default. */
     CHECK(two_plane_width_error("technique=cssm&taps=5") < 0.02);
     CHECK(two_plane_width_error("technique=cssm") < 0.08);
     CHECK(two_plane_width_error("technique=cssm&storage=tables") < 0.05);

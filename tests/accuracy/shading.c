@@ -1,6 +1,6 @@
-/* Unshadowed light of area emitters on a plane of roughness 1: the closed-form irradiance and the
- * specular quadrature against Lambert's and the GGX integral summed over many points of the
- * emitter. */
+/* Unshadowed light of area emitters on a plane of roughness 1: the closed-form irradiance
+ * and the specular quadrature against Lambert's and the GGX integral summed over many points
+ * of the emitter. */
 #include "tests/accuracy/harness.h"
 #include "tests/unit/check.h"
 #include <math.h>
@@ -14,8 +14,8 @@ struct emitter {
 };
 
 static const double eye[3] = {0, 1, 0};
-/* Of the generated plane: base colour 0.5, dielectric with F0 0.04, whose share diffuse light
- * lacks. */
+/* Of the generated plane: base colour 0.5, dielectric with F0 0.04, whose share
+ * diffuse light lacks. */
 static const double diffuse = 0.5 * 0.96 / M_PI, f0 = 0.04;
 
 static double dot(const double a[3], const double b[3])

@@ -1,5 +1,5 @@
-/* Normals, tangents, the watertight flag and meshlet bounds against closed forms and brute force.
- */
+/* Normals, tangents, the watertight flag and meshlet bounds against closed forms
+ * and brute force. */
 #include "tests/unit/blob_shapes.h"
 
 static void flat_normals_of_a_cube(void)

@@ -1,5 +1,5 @@
-/* The few assertions our C tests use. A test is a program: exit 0 passed, 77 skipped, else failed.
- */
+/* The few assertions our C tests use. A test is a program: exit 0 passed, 77
+ * skipped, else failed. */
 #pragma once
 #include <math.h>
 #include <stdio.h>

@@ -1,5 +1,5 @@
-/* A small catalogue with one parameter of every kind, so that the documents are tested without the
- * renderer. */
+/* A small catalogue with one parameter of every kind, so that the documents are tested
+ * without the renderer. */
 #pragma once
 #include "protocol/request.h"
 #include "protocol/technique_info.h"

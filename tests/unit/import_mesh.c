@@ -50,8 +50,8 @@ static void modes(void)
     }
 }
 
-/* One vertex of a triangle with every attribute; colours as vec3 of bytes, uv as normalised shorts.
- */
+/* One vertex of a triangle with every attribute; colours as vec3 of bytes, uv
+ * as normalised shorts. */
 static void attributes(void)
 {
     struct {

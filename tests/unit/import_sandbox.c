@@ -1,5 +1,5 @@
-/* The sandbox from inside: each attempt in a child of its own, which exits 0 when it was stopped.
- */
+/* The sandbox from inside: each attempt in a child of its own, which exits 0 when
+ * it was stopped. */
 #include "renderer/import/sandbox.h"
 #include "tests/unit/check.h"
 #include <errno.h>

@@ -1,5 +1,5 @@
-/* The shader's hierarchy: what its layout promises, and its answers against every triangle in turn.
- */
+/* The shader's hierarchy: what its layout promises, and its answers against every
+ * triangle in turn. */
 #include "renderer/trace/bvh.h"
 #include "renderer/blob/builder.h"
 #include "tests/unit/check.h"

@@ -1,6 +1,6 @@
-/* The ray tracer against closed forms: a straight edge under a square, a disk, a sphere and the
- * sun; a square caster; stacked and duplicate casters; a two-coloured light; a cut-out; a lit
- * plane. */
+/* The ray tracer against closed forms: a straight edge under a square, a disk, a sphere and
+ * the sun; a square caster; stacked and duplicate casters; a two-coloured light; a cut-out;
+ * a lit plane. */
 #include "tests/unit/trace_fixture.h"
 
 #define HALF 0.5f /* of the light */
@@ -13,8 +13,8 @@ struct edge {
     double from;   /* the light's distance: LIGHT_Y, or infinite for the sun */
 };
 
-/* Where the edge x = 0 cuts the light, as seen from x, in half-extents; the light beyond is hidden.
- */
+/* Where the edge x = 0 cuts the light, as seen from x, in half-extents; the light
+ * beyond is hidden. */
 static double cut_of(const struct edge *e, double x, double half)
 {
     if (isinf(e->from))

@@ -20,8 +20,8 @@ struct imp_context {
     uint32_t light_count, camera_count;
 
     uint32_t *primitives; /* psc number of each glTF primitive, or one of the two below */
-    uint32_t
-        *materials; /* psc number of each glTF material and, last, of none; UINT32_MAX: not yet */
+    /* psc number of each glTF material and, last, of none; UINT32_MAX: not yet. */
+    uint32_t *materials;
     uint32_t *textures; /* psc number of each glTF texture: [0] linear, [1] sRGB */
     struct imp_image_slot *image_slots;
     uint32_t image_slot_count;
@@ -78,6 +78,6 @@ void imp_add_light(struct imp_context *context, const struct gltf_light *light,
 /* camera.c; reads the bounds, so it comes after every instance. */
 void imp_add_camera(struct imp_context *context, const struct gltf_camera *camera,
     const struct gltf_node *node, const double world[12]);
-/* camera.c: the first name that is not empty, cut at a character's end, without control characters.
- */
+/* camera.c: the first name that is not empty, cut at a character's end,
+ * without control characters. */
 void imp_name(char to[GLTF_NAME_BYTES], const char *preferred, const char *otherwise);

@@ -17,10 +17,9 @@ struct imp_geometry {
 
 void imp_geometry_finish(struct imp_geometry *geometry);
 
-/* optimise.c: welds equal vertices, orders triangles into meshlets of at most
- * IMP_MESHLET_TRIANGLES (compact ones with narrow normal cones, in an order kind to the vertex
- * cache) and vertices by first use. The set of triangles stays the same. Meshes that would cost
- * more than is left of *work, because very many triangles meet at one place, stay in their order.
- */
+/* optimise.c: welds equal vertices, orders triangles into meshlets of at most IMP_MESHLET_TRIANGLES
+ * (compact ones with narrow normal cones, in an order kind to the vertex cache) and vertices by
+ * first use. The set of triangles stays the same. Meshes that would cost more than is left of
+ * *work, because very many triangles meet at one place, stay in their order. */
 void imp_geometry_optimise(struct imp_geometry *geometry, uint64_t *work);
 #define IMP_MESHLET_TRIANGLES 124

@@ -88,9 +88,9 @@ static void build_meshlets(struct imp_geometry *g)
     free(triangles);
 }
 
-/* The optimisers below look at all neighbours of a vertex, and at all triangles of a place, for
- * each of its triangles: their work grows with the sum of squares of how many corners meet at a
- * place. */
+/* The optimisers below look at all neighbours of a vertex, and at all triangles of a place,
+ * for each of its triangles: their work grows with the sum of squares of how many corners meet
+ * at a place. */
 static uint64_t crowding(const struct imp_geometry *g, unsigned *remap)
 {
     size_t places = meshopt_generateVertexRemap(

@@ -26,8 +26,7 @@ struct imp_files {
 };
 
 /* Reads the table of a bundle (bundle.h) or zip; the data must outlive *files. On failure *files is
- * empty. Errors: PEN_INVALID (damaged, unsafe or duplicate names, encrypted), PEN_TOO_BIG.
- */
+ * empty. Errors: PEN_INVALID (damaged, unsafe or duplicate names, encrypted), PEN_TOO_BIG. */
 bool imp_files_open_bundle(
     struct imp_files *files, const uint8_t *data, size_t bytes, struct pen_error *error);
 bool imp_files_open_zip(

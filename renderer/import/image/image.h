@@ -14,9 +14,9 @@ const char *imp_image_mime(enum imp_image_kind kind);
 bool imp_image_header(
     struct imp_bytes data, uint32_t *width, uint32_t *height, struct pen_error *error);
 
-/* The pixels as RGBA8, top row first; the caller frees *rgba. `width` and `height` are what
- * imp_image_header gave. *damaged tells that some pixels are missing (JPEG only). Errors:
- * PEN_INVALID. */
+/* The pixels as RGBA8, top row first; the caller frees *rgba. `width` and `height`
+ * are what imp_image_header gave. *damaged tells that some pixels are missing (JPEG
+ * only). Errors: PEN_INVALID. */
 bool imp_image_decode(struct imp_bytes data, uint32_t width, uint32_t height, uint8_t **rgba,
     bool *damaged, struct pen_error *error);
 

@@ -35,9 +35,9 @@ bool pass_penumbra_tiles(struct technique_run *run, const struct shadow_input *c
 
 enum penumbra_source { PENUMBRA_HARD, PENUMBRA_SAMPLES };
 
-/* Fills vis from SCRATCH_SPREAD's hard visibility, or from the sums of SCRATCH_LIT (SCRATCH_ALL),
- * by a separable Gaussian of P(sigma) times the light's own. Nothing happens before the last face.
- */
+/* Fills vis from SCRATCH_SPREAD's hard visibility, or from the sums of SCRATCH_LIT
+ * (SCRATCH_ALL), by a separable Gaussian of P(sigma) times the light's own. Nothing happens
+ * before the last face. */
 bool pass_penumbra_gauss(
     struct technique_run *run, enum penumbra_source source, struct pen_error *error);
 

@@ -40,9 +40,9 @@ struct cascade_tiles {
 bool cascade_range(const struct view *view, const struct light *light,
     const struct cascade_tiles *tiles, float range[2]);
 
-/* Where one face's map plane shows a cascade's receivers from the emitter's centre, and their
- * distances, both in whole steps and rounded outwards: the cascade's maps depend on nothing else.
- */
+/* Where one face's map plane shows a cascade's receivers from the emitter's centre, and
+ * their distances, both in whole steps and rounded outwards: the cascade's maps depend
+ * on nothing else. */
 struct cascade_bounds {
     int32_t low[3], high[3]; /* x, y: 1/64 of the face's window; z: of how far samples move it */
 };

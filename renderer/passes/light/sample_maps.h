@@ -20,10 +20,11 @@ void sample_points(const struct light_face *face, uint32_t count, struct sample_
 /* What the lookup needs per sample; std140 array element. As SampleMap in sample_maps.glsl. */
 struct sample_map {
     float at[4]; /* xy: emitter position; zw: the same in [-1, 1]^2 */
-    float
-        window[4]; /* map uv = l * window.xy + window.zw, l on the map plane seen from the sample */
-    float layer[4]; /* x: layer, negative: nothing casts there; y: weight; z: side of the part of
-                       the emitter that it stands for, in uv (2: all of it); w: the method's own */
+    /* Map uv = l * window.xy + window.zw, l on the map plane seen from the sample. */
+    float window[4];
+    /* x: layer, negative: nothing casts there; y: weight; z: side of the part of the emitter that
+     * it stands for, in uv (2: all of it); w: the method's own. */
+    float layer[4];
 };
 struct sample_map sample_map_entry(
     const struct sample_point *point, const float rect[4], uint32_t layer);

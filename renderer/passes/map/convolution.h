@@ -21,8 +21,8 @@ struct convolution_desc {
 
 /* As ConvolutionBlock in convolution.glsl. */
 struct convolution_block {
-    float weight[CONVOLUTION_MAX_TERMS]; /* 2 / c_k exp(-alpha (k / M)^2), c_k = (2k - 1) pi; 0 past
-                                            M */
+    /* 2 / c_k exp(-alpha (k / M)^2), c_k = (2k - 1) pi; 0 past M. */
+    float weight[CONVOLUTION_MAX_TERMS];
     float range;       /* the depth range is scaled to [0, range], so that no gap folds back */
     float offset;      /* in scaled depth */
     float low, scale;  /* V = (f - low) * scale: what the ripple leaves of 0 and 1 */

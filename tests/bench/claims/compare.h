@@ -12,8 +12,8 @@ struct picture {
     struct pen_result result;
 };
 
-/* Adds variant `test` against variant `reference` to the open array; nothing when either is
- * missing. */
+/* Adds variant `test` against variant `reference` to the open array; nothing when
+ * either is missing. */
 void compare_write(struct pen_json *json, const struct plan_group *group,
     const struct picture *pictures, uint32_t test, uint32_t reference, bool flip);
 

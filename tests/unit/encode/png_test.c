@@ -1,5 +1,5 @@
-/* The PNG writer against libspng: every bit, sizes that are awkward, metadata, determinism, speed.
- */
+/* The PNG writer against libspng: every bit, sizes that are awkward,
+ * metadata, determinism, speed. */
 #include "tests/unit/check.h"
 #include "tests/unit/encode/pattern.h"
 #include <spng.h>

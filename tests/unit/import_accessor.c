@@ -155,9 +155,10 @@ static void meshopt(void)
     const unsigned indices[6] = {0, 1, 2, 0, 2, 3};
     uint8_t buffer[4096];
     size_t at[5] = {0};
-    uint32_t exponential[4][3];
+    /* 32 bit of the exponential filter: exponent << 24 | mantissa, so 2 = 1 * 2^1. */
+    enum { TWO = 1 << 24 | 1 };
+    const uint32_t exponential[4][3] = {{0, 0, 0}, {TWO, 0, 0}, {TWO, TWO, 0}, {0, TWO, 0}};
     int8_t octahedral[4][4];
-    meshopt_encodeFilterExp(exponential, 4, 12, 15, positions[0]);
     meshopt_encodeFilterOct(octahedral, 4, 4, 8, normals[0]);
     at[1] = meshopt_encodeVertexBuffer(buffer, sizeof buffer, exponential, 4, 12);
     at[2] =

@@ -389,6 +389,17 @@ bool write_nothing(std::string *, const std::string &, const std::vector<unsigne
     return false;
 }
 
+/* Newer versions of tinygltf also ask how large a file is, and want this answered as well. */
+template <class Callbacks>
+auto refuse_sizes(Callbacks &files, int) -> decltype(files.GetFileSizeInBytes, void())
+{
+    files.GetFileSizeInBytes = [](size_t *, std::string *, const std::string &, void *) {
+        return false;
+    };
+}
+
+template <class Callbacks> void refuse_sizes(Callbacks &, long) {}
+
 bool load_no_image(tinygltf::Image *, const int, std::string *, std::string *, int, int,
     const unsigned char *, int, void *)
 {
@@ -398,7 +409,13 @@ bool load_no_image(tinygltf::Image *, const int, std::string *, std::string *, i
 void parse(const char *text, size_t bytes, tinygltf::Model &model, struct pen_error *error)
 {
     tinygltf::TinyGLTF loader;
-    loader.SetFsCallbacks({no_file_exists, no_path, read_nothing, write_nothing, nullptr});
+    tinygltf::FsCallbacks files = {};
+    files.FileExists = no_file_exists;
+    files.ExpandFilePath = no_path;
+    files.ReadWholeFile = read_nothing;
+    files.WriteWholeFile = write_nothing;
+    refuse_sizes(files, 0);
+    loader.SetFsCallbacks(files);
     loader.SetImageLoader(load_no_image, nullptr);
     std::string failure, warning;
     if (!loader.LoadASCIIFromString(

@@ -72,9 +72,10 @@ static bool check_members(struct walk *walk, cJSON *value, const struct field *f
     for (cJSON *item = value->child; item; item = item->next, count++) {
         struct step step = {walk->at, field->kind == INDEX_MAP ? item->string : NULL, count};
         walk->at = &step;
-        if (!check_member(walk, item, field))
-            return false;
+        bool fine = check_member(walk, item, field);
         walk->at = step.up;
+        if (!fine)
+            return false;
     }
     if (field->kind == NUMBERS && count != field->max)
         return bad(walk, "has the wrong number of components");
@@ -129,18 +130,20 @@ static bool check_object(struct walk *walk, cJSON *object, const struct schema *
         struct step step = {walk->at, field->key, 0};
         walk->at = &step;
         /* Two parsers may prefer different ones, and then one of them was never checked. */
-        if (seen >> i & 1)
-            return bad(walk, "stands there twice");
+        bool fine =
+            seen >> i & 1 ? bad(walk, "stands there twice") : check_value(walk, item, field);
         seen |= 1u << i;
-        if (!check_value(walk, item, field))
-            return false;
         walk->at = step.up;
+        if (!fine)
+            return false;
     }
     for (uint32_t i = 0; i < schema->count; i++)
         if (schema->fields[i].required && !(seen >> i & 1)) {
             struct step step = {walk->at, schema->fields[i].key, 0};
             walk->at = &step;
-            return bad(walk, "is required");
+            bad(walk, "is required");
+            walk->at = step.up;
+            return false;
         }
     return true;
 }

@@ -1,8 +1,8 @@
 /* What the files of this folder share. */
 #pragma once
+#include "renderer/trace/embree.h"
 #include "renderer/trace/points.h"
 #include "renderer/trace/trace.h"
-#include <embree3/rtcore.h>
 #include <stdatomic.h>
 
 /* The scene's triangles by what decides whether a hit on them counts. */
@@ -94,7 +94,7 @@ struct pen_trace_scene {
 
 /* The context of a query: Embree's own first, so that filters can cast back. */
 struct trace_context {
-    struct RTCIntersectContext embree;
+    embree_context embree;
     uint32_t salt; /* makes stochastic alpha of one sample differ from that of the next */
 };
 

@@ -191,8 +191,7 @@ static inline __attribute__((always_inline)) void run(const struct trace_emitter
     bool disk, bool own_frame, bool sun)
 {
     struct trace_context query;
-    rtcInitIntersectContext(&query.embree);
-    query.embree.flags = RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
+    embree_context_init(&query.embree);
     float u[LANES], v[LANES], weight[LANES] = {0}, last_weight[LANES] = {0};
     int32_t valid[LANES] __attribute__((aligned(64)));
     int32_t seen[LANES], last[LANES] = {0}, count[LANES] = {0}, pairs[LANES] = {0};
@@ -201,7 +200,7 @@ static inline __attribute__((always_inline)) void run(const struct trace_emitter
             own_frame, sun, u, v, valid);
         if (in_front && !(mode & TRACE_ASSUME_VISIBLE)) {
             query.salt = trace_hash(block->salt + i);
-            rtcOccluded16(valid, e->scene, &query.embree, &p->ray);
+            embree_occluded16(valid, e->scene, &query.embree, &p->ray);
             sums->rays += (uint32_t)in_front;
         }
         for (int l = 0; l < LANES; l++) {

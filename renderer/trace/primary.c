@@ -118,9 +118,8 @@ static void trace_block(void *context, uint32_t item)
         valid[lane] = x < camera->width && y < camera->height ? -1 : 0;
     }
     struct trace_context query = {.salt = 0};
-    rtcInitIntersectContext(&query.embree);
-    query.embree.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
-    rtcIntersect16(valid, p->rtc, &query.embree, &ray);
+    embree_context_init(&query.embree);
+    embree_intersect16(valid, p->rtc, &query.embree, &ray);
     for (uint32_t lane = 0; lane < LANES; lane++)
         if (valid[lane])
             store(p, (y0 + lane / BLOCK) * camera->width + x0 + lane % BLOCK, &ray, lane);

@@ -1,4 +1,4 @@
-/* Ray-traced visibility of area lights on the CPU (Embree 3): the reference that every shadow map
+/* Ray-traced visibility of area lights on the CPU (Embree): the reference that every shadow map
  * method is measured against. No GL. Units are metres, world space; colours are linear RGB.
  *
  * Who casts: every triangle of the scene, under the rules of the shadow maps. A triangle of a

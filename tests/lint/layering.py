@@ -28,7 +28,7 @@ RULES = [
       "seccomp.h", "cglm/*", "OpenImageIO/*", "openssl/*", "libdeflate.h", "zlib.h"], "system"),
     (r"renderer/encode/.*", FLOOR_1 + ["renderer/renderer.h", "renderer/encode/*"],
      ["OpenImageIO/*", "isa-l.h", "isa-l/*", "webp/*"], "system"),
-    (r"renderer/trace/.*", FLOOR_1 + ["renderer/*"], ["embree3/*"] + GL, "system"),
+    (r"renderer/trace/.*", FLOOR_1 + ["renderer/*"], ["embree[34]/*"] + GL, "system"),
     (r"renderer/.*", FLOOR_1 + ["renderer/*"], GL, "system"),
     (r"server/.*",
      ["protocol/*", "server/*", "renderer/renderer.h", "renderer/encode/encode.h",

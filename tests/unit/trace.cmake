@@ -1,6 +1,6 @@
 if(TARGET penumbra_trace)
     penumbra_unit_test(trace_closed_forms trace_closed_forms.c LIBS penumbra_trace penumbra_blob m)
     penumbra_unit_test(trace_rules trace_rules.c LIBS penumbra_trace penumbra_blob m)
-    penumbra_unit_test(trace_jobs trace_jobs.c LIBS penumbra_trace penumbra_blob m)
-    target_include_directories(test_trace_jobs SYSTEM PRIVATE ${EMBREE3_INCLUDE_DIR})
+    penumbra_unit_test(trace_jobs trace_jobs.c LIBS penumbra_trace penumbra_embree
+        penumbra_blob m)
 endif()

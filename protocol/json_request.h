@@ -3,7 +3,7 @@
 #include "protocol/request.h"
 #include "protocol/technique_info.h"
 
-/* Reads a request body: api.md, "A render request". Every default is filled in, every value checked
+/* Reads a request body, RenderRequest of the OpenAPI document. Every default is filled in, every value checked
  * (rows, then pen_request_check). `text` needs no NUL. The scene's id is not part of the body: it
  * is left zero. Two bodies that mean the same give the same bytes in *request. Errors:
  * PEN_TOO_BIG above PEN_MAX_JSON_BYTES, PEN_MALFORMED for malformed or too deeply nested JSON

@@ -255,7 +255,7 @@ void light_face_cull(
     /* world_to_light is rigid, so its inverse is exact enough for an eye point. */
     glm_mat4_inv((vec4 *)f->world_to_light, inverse);
     float eye[3] = {sample[0], sample[1], 0};
-    if (f->parallel) /* light travels along (-t, 1): see techniques' F2 for a parallel light */
+    if (f->parallel) /* light travels along (-t, 1): docs/light-space.md */
         eye[0] = -sample[0], eye[1] = -sample[1], eye[2] = 1;
     glm_mat4_mulv3(inverse, eye, f->parallel ? 0 : 1, cull->eye);
     if (f->parallel)

@@ -6,7 +6,7 @@
 
 enum light_shape { LIGHT_RECT = 0, LIGHT_DISK = 1 };
 
-/* One light space (techniques.md section 1): right-handed, origin in the centre of the emitter, +z
+/* One light space (docs/light-space.md): right-handed, origin in the centre of the emitter, +z
  * along the emission. The shadow map is the window `rect` of the plane z = near_z, in metres; for a
  * parallel light x and y of the map are x and y of light space. std140: uploaded as it is. */
 struct light_face {

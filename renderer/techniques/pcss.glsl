@@ -1,4 +1,4 @@
-// Fernando 2005 with exact projections (F3, F4 of the light frame) and the receiver's plane.
+// Fernando 2005 with exact projections (F3, F4) and the receiver's plane.
 #include "light_pcf.glsl"
 #include "min_max.glsl"
 

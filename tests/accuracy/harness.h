@@ -51,7 +51,7 @@ typedef double (*truth_function)(double x, double z, const void *user);
 struct deviation harness_deviation(const struct shot *shot, truth_function truth, const void *user);
 
 /* T1 (half-plane x <= 0 at height c, rect light of half width a at height h), T2 (square of half
- * size s), T3 (T1 under a disk of radius a). techniques: Soler and Sillion 1998 for T2. */
+ * size s), T3 (T1 under a disk of radius a): docs/closed-forms.md. */
 struct planar_case {
     double c, h, a, s;
 };

@@ -1,6 +1,6 @@
 // Light space: origin in the centre of the emitter, +z along the emission, the shadow map is the
 // window `rect` of the plane z = near_z. A parallel light is the limit of an emitter infinitely far
-// away: `extent` is then the tangent of half its diameter. Formulas F1 to F6: see docs in README.
+// away: `extent` is then the tangent of half its diameter. docs/light-space.md derives F1 to F6.
 layout(std140, binding = 1) uniform LightBlock {
     mat4 world_to_light;
     mat4 clip_to_light;

@@ -1,6 +1,6 @@
 // The map's texels as small casters: walks those that can hide part of the emitter from a receiver
 // and hands each one's shadow on the emitter to the method, as a rectangle in emitter coordinates
-// ([-1, 1]^2 or the unit disk), found by F2 of the light frame.
+// ([-1, 1]^2 or the unit disk), found by F2 (docs/light-space.md).
 //
 // The window comes from the bounds of depth in the pyramid, which is then walked as a quadtree: a
 // node without a caster or beside the light ends there, and one whose depths barely differ, or that

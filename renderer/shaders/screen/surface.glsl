@@ -1,4 +1,4 @@
-// The receiver under a pixel, in light space (techniques' common frame).
+// The receiver under a pixel, in light space (docs/light-space.md).
 #include "view.glsl"
 #include "octahedral.glsl"
 #include "light.glsl"

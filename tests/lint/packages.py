@@ -22,7 +22,7 @@ CMAKE = {
     "meshoptimizer": "libmeshoptimizer-dev", "embree": "libembree-dev", "embree3": "libembree-dev",
     "embree4": "libembree-dev",
     "tinygltf": "libtinygltf-dev", "tiny_gltf.h": "libtinygltf-dev",
-    "tbb": "libembree-dev", "osmesa": "libosmesa6-dev", "clang-format": "clang-format",
+    "tbb": "libembree-dev", "clang-format": "clang-format",
     "embree3/rtcore.h": "libembree-dev", "embree4/rtcore.h": "libembree-dev",
     "microhttpd.h": "libmicrohttpd-dev",
     "meshoptimizer.h": "libmeshoptimizer-dev", "nlohmann_json": "nlohmann-json3-dev",

@@ -1,6 +1,6 @@
 /* penumbrad: settings, signals, and the life of the service. */
 #include "renderer/renderer.h"
-#include "server/log.h"
+#include "server/base/log.h"
 #include "server/service.h"
 #include <errno.h>
 #include <pthread.h>

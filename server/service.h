@@ -1,16 +1,16 @@
 /* The parts of the running daemon, and what ties them together. */
 #pragma once
 #include "protocol/technique_info.h"
-#include "server/auth.h"
-#include "server/auto_render.h"
-#include "server/config.h"
-#include "server/http.h"
-#include "server/importer.h"
-#include "server/metrics.h"
-#include "server/result_cache.h"
-#include "server/scene_store.h"
-#include "server/scheduler.h"
-#include "server/worker_pool.h"
+#include "server/http/auth.h"
+#include "server/auto/render.h"
+#include "server/base/config.h"
+#include "server/http/http.h"
+#include "server/store/importer.h"
+#include "server/base/metrics.h"
+#include "server/store/result_cache.h"
+#include "server/store/scene_store.h"
+#include "server/queue/scheduler.h"
+#include "server/workers/worker_pool.h"
 #include <pthread.h>
 
 struct service {

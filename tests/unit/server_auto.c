@@ -1,6 +1,6 @@
 /* The policy of "auto", on tables made up for the purpose. */
-#include "server/auto_history.h"
-#include "server/calibration.h"
+#include "server/auto/history.h"
+#include "server/auto/calibration.h"
 #include "tests/unit/check.h"
 
 static const struct pen_param sample_rows[] = {

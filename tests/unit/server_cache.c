@@ -1,5 +1,5 @@
 /* Pictures: what a memfd must be, tags, and the cache's order and budget. */
-#include "server/result_cache.h"
+#include "server/store/result_cache.h"
 #include "tests/unit/check.h"
 #include <fcntl.h>
 #include <sys/mman.h>

@@ -1,5 +1,5 @@
 /* Messages between processes: what arrives, with its descriptors, and what is not let in. */
-#include "server/channel.h"
+#include "server/workers/channel.h"
 #include "tests/unit/check.h"
 #include <errno.h>
 #include <fcntl.h>

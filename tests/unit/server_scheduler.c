@@ -1,6 +1,6 @@
 /* Order, limits, sharing, deadlines and retries of the queue; then all of it from many threads. */
-#include "server/clock.h"
-#include "server/scheduler.h"
+#include "server/base/clock.h"
+#include "server/queue/scheduler.h"
 #include "tests/unit/check.h"
 #include <pthread.h>
 #include <unistd.h>

@@ -1,9 +1,9 @@
 /* Settings from flags and variables, the Accept header, tokens, and the quarantine. */
 #include "protocol/request.h"
-#include "server/accept.h"
-#include "server/auth.h"
-#include "server/config.h"
-#include "server/quarantine.h"
+#include "server/http/accept.h"
+#include "server/http/auth.h"
+#include "server/base/config.h"
+#include "server/workers/quarantine.h"
 #include "tests/unit/check.h"
 #include <unistd.h>
 

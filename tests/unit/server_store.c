@@ -1,8 +1,8 @@
 /* The store: complete or not there, across openings, damage and leftovers. */
 #include "protocol/request.h"
 #include "renderer/blob/builder.h"
-#include "server/scene_store.h"
-#include "server/upload.h"
+#include "server/store/scene_store.h"
+#include "server/store/upload.h"
 #include "tests/unit/check.h"
 #include <dirent.h>
 #include <fcntl.h>

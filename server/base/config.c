@@ -1,0 +1,231 @@
+#include "server/base/config.h"
+#include "renderer/renderer.h"
+#include <ctype.h>
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum kind { KIND_TEXT, KIND_NUMBER, KIND_SIZE, KIND_FLAG, KIND_CHOICE };
+
+struct row {
+    const char *name; /* the C field: its flag has dashes, its variable capitals */
+    const char *help;
+    const char *const *choices;
+    const char *def;
+    uint64_t min, max;
+    uint16_t offset;
+    uint8_t kind;
+};
+
+static const char *const log_format_names[] = {"text", "json", NULL};
+
+#define KIND_OF(field)                                                                             \
+    _Generic((field), char * : KIND_TEXT, uint64_t : KIND_NUMBER, config_size : KIND_SIZE,         \
+             config_flag : KIND_FLAG, config_choice : KIND_CHOICE)
+#define ROW(field, default_text, ...)                                                              \
+    {                                                                                              \
+        .name = #field, .def = default_text, .offset = offsetof(struct config, field),             \
+        .kind = KIND_OF(((struct config *)0)->field), __VA_ARGS__                                  \
+    }
+#define TIME .min = 1, .max = 86400000
+#define SIZE .max = 1ull << 50
+
+static const struct row rows[] = {
+    ROW(listen, "127.0.0.1:8080", .help = "Address and port of the public listener; port 0: any."),
+    ROW(admin_listen, "127.0.0.1:8081",
+        .help = "Address and port of /livez, /readyz and /metrics, which ask for no token."),
+    ROW(store, "penumbra-store", .help = "Folder of the stored scenes and images."),
+    ROW(device, "auto", .choices = pen_device_choice_names, .help = "Kind of device to render on."),
+    ROW(device_index, "0", .max = 63,
+        .help = "First GPU to use; further workers take the following ones."),
+    ROW(require_gpu, "off", .help = "Refuse to render in software."),
+    ROW(gl_debug, "off", .help = "Write OpenGL's debug messages to the log."),
+    ROW(warm_up, "on",
+        .help = "Compile what common requests need before the service says that it is ready."),
+    ROW(gpu_memory, "1G", SIZE, .min = 1 << 20,
+        .help = "Budget of each worker for scenes, images and shadow inputs."),
+    ROW(workers, "1", .min = 1, .max = 16, .help = "Render processes: one per GPU."),
+    ROW(queue_limit, "64", .min = 1, .max = 65536,
+        .help = "Renders that may wait; beyond it the answer is 503."),
+    ROW(client_share, "48", .max = 65536,
+        .help = "Renders that one client may have under way; beyond it 429. 0: no limit."),
+    ROW(result_cache, "256M", SIZE, .help = "Memory for encoded images; 0: keep none."),
+    ROW(hang_timeout_ms, "120000", TIME,
+        .help = "A render that is past its deadline and this old is ended with its worker."),
+    ROW(canary_interval_ms, "5000", TIME, .help = "How long /readyz trusts its last test render."),
+    ROW(quarantine_s, "600", .max = 86400,
+        .help = "How long a scene that ended two workers is refused."),
+    ROW(connections, "512", .min = 4, .max = 60000, .help = "Public connections; beyond it 503."),
+    ROW(connections_per_address, "256", .min = 1, .max = 60000,
+        .help = "Public connections from one address; beyond it 429."),
+    ROW(http_threads, "2", .min = 1, .max = 64, .help = "Threads of the public listener."),
+    ROW(header_timeout_ms, "10000", TIME, .help = "Time to send a whole request header."),
+    ROW(keep_alive_ms, "30000", TIME, .help = "How long an idle connection is kept."),
+    ROW(body_rate, "16K", SIZE, .min = 1,
+        .help = "Slowest body that is accepted, bytes per second, after five seconds."),
+    ROW(upload_limit, "1G", .min = 1, .max = PEN_MAX_UPLOAD_BYTES, .help = "Largest upload."),
+    ROW(uploads, "16", .min = 1, .max = 1024, .help = "Uploads at a time; beyond it 503."),
+    ROW(imports, "2", .min = 1, .max = 64, .help = "Importer processes at a time."),
+    ROW(import_timeout_ms, "120000", TIME, .help = "Wall-clock limit of one import."),
+    ROW(import_cpu_seconds, "60", .min = 1, .max = 86400, .help = "Processor limit of one import."),
+    ROW(import_memory, "2G", SIZE, .min = 1 << 20, .help = "Memory limit of one import."),
+    ROW(drain_timeout_ms, "60000", TIME,
+        .help = "On SIGTERM, how long accepted requests may take to be answered."),
+    ROW(token_file, "", .help = "Bearer tokens, one a line, \"name token\" or \"token\"."),
+    ROW(tls_cert, "", .help = "Certificate chain of the public listener, PEM."),
+    ROW(tls_key, "", .help = "Its private key, PEM."),
+    ROW(insecure, "off", .help = "Listen beyond loopback without tokens."),
+    ROW(cors_origin, "", .help = "Origin that pages may call from, or *; empty: none."),
+    ROW(worker_path, "", .help = "penumbra-worker; empty: next to penumbrad."),
+    ROW(import_path, "", .help = "penumbra-import; empty: next to penumbrad."),
+    ROW(log_format, "text", .choices = log_format_names, .help = "Form of the log, on stderr."),
+};
+#define ROWS (sizeof rows / sizeof *rows)
+
+static void flag_name(const struct row *row, char *text)
+{
+    char *at = text + sprintf(text, "--");
+    for (const char *c = row->name; *c; c++)
+        *at++ = *c == '_' ? '-' : *c;
+    *at = 0;
+}
+
+static void variable_name(const struct row *row, char *text)
+{
+    char *at = text + sprintf(text, "PENUMBRA_");
+    for (const char *c = row->name; *c; c++)
+        *at++ = (char)toupper((unsigned char)*c);
+    *at = 0;
+}
+
+static bool parse_number(const struct row *row, const char *text, uint64_t *value)
+{
+    char *end;
+    errno = 0;
+    *value = strtoull(text, &end, 10);
+    if (!isdigit((unsigned char)*text) || errno)
+        return false;
+    int shift = 0;
+    if (row->kind == KIND_SIZE && *end) {
+        shift = *end == 'K' ? 10 : *end == 'M' ? 20 : *end == 'G' ? 30 : 0;
+        if (!shift || *value > UINT64_MAX >> shift)
+            return false;
+        end++;
+    }
+    *value <<= shift;
+    return *end == 0;
+}
+
+static bool store(const struct row *row, struct config *config, const char *text,
+    const char *source, struct pen_error *error)
+{
+    void *at = (char *)config + row->offset;
+    uint64_t number = 0;
+    int index;
+    switch (row->kind) {
+    case KIND_TEXT:
+        if (strlen(text) >= CONFIG_TEXT_BYTES)
+            return pen_fail(error, PEN_INVALID, "", "%s is too long.", source);
+        strcpy(at, text);
+        return true;
+    case KIND_NUMBER:
+    case KIND_SIZE:
+        if (!parse_number(row, text, &number) || number < row->min || number > row->max)
+            return pen_fail(error, PEN_INVALID, "",
+                "%s must be a whole number from %llu to %llu%s, not \"%.40s\".", source,
+                (unsigned long long)row->min, (unsigned long long)row->max,
+                row->kind == KIND_SIZE ? ", with K, M or G if you like" : "", text);
+        if (row->kind == KIND_SIZE)
+            ((config_size *)at)->bytes = number;
+        else
+            *(uint64_t *)at = number;
+        return true;
+    case KIND_FLAG:
+        if (!strcmp(text, "1") || !strcmp(text, "on") || !strcmp(text, "true"))
+            ((config_flag *)at)->on = true;
+        else if (!strcmp(text, "0") || !strcmp(text, "off") || !strcmp(text, "false"))
+            ((config_flag *)at)->on = false;
+        else
+            return pen_fail(error, PEN_INVALID, "", "%s must be on or off.", source);
+        return true;
+    default:
+        index = pen_choice_index(row->choices, text);
+        if (index < 0)
+            return pen_fail(error, PEN_INVALID, "", "%s has no choice \"%.40s\".", source, text);
+        ((config_choice *)at)->index = (uint32_t)index;
+        return true;
+    }
+}
+
+/* The row for "--queue-limit" or "--queue-limit=8"; *value points behind '=' or is NULL. */
+static const struct row *find_flag(const char *argument, const char **value)
+{
+    size_t length = strcspn(argument, "=");
+    *value = argument[length] ? argument + length + 1 : NULL;
+    for (size_t r = 0; r < ROWS; r++) {
+        char name[64];
+        flag_name(&rows[r], name);
+        if (strlen(name) == length && !strncmp(name, argument, length))
+            return &rows[r];
+    }
+    return NULL;
+}
+
+bool config_read(struct config *config, int argc, char **argv, struct pen_error *error)
+{
+    memset(config, 0, sizeof *config);
+    for (size_t r = 0; r < ROWS; r++) {
+        char name[64];
+        variable_name(&rows[r], name);
+        const char *text = getenv(name);
+        if (!store(&rows[r], config, rows[r].def, rows[r].name, error) ||
+            (text && !store(&rows[r], config, text, name, error)))
+            return false;
+    }
+    for (int i = 1; i < argc; i++) {
+        const char *value;
+        const struct row *row = find_flag(argv[i], &value);
+        if (!row)
+            return pen_fail(
+                error, PEN_INVALID, "", "There is no setting %.60s; see --help.", argv[i]);
+        char name[64];
+        flag_name(row, name);
+        if (!value && row->kind == KIND_FLAG)
+            value = "on";
+        else if (!value && ++i < argc)
+            value = argv[i];
+        if (!value)
+            return pen_fail(error, PEN_INVALID, "", "%s needs a value.", name);
+        if (!store(row, config, value, name, error))
+            return false;
+    }
+    if (!*config->tls_cert != !*config->tls_key)
+        return pen_fail(error, PEN_INVALID, "", "--tls-cert and --tls-key go together.");
+    return true;
+}
+
+bool config_answer_help(int argc, char **argv)
+{
+    for (int i = 1; i < argc; i++) {
+        if (!strcmp(argv[i], "--version")) {
+            printf("penumbrad %s\n", PENUMBRA_VERSION);
+            return true;
+        }
+        if (strcmp(argv[i], "--help"))
+            continue;
+        printf("penumbrad %s: renders soft shadows over HTTP.\n\n"
+               "Every flag is also a variable: --queue-limit is PENUMBRA_QUEUE_LIMIT.\n\n",
+            PENUMBRA_VERSION);
+        for (size_t r = 0; r < ROWS; r++) {
+            char name[64];
+            flag_name(&rows[r], name);
+            printf("  %-27s %s", name, rows[r].help);
+            for (int c = 0; rows[r].choices && rows[r].choices[c]; c++)
+                printf("%s%s", c ? ", " : " One of ", rows[r].choices[c]);
+            printf(" [%s]\n", rows[r].def);
+        }
+        return true;
+    }
+    return false;
+}

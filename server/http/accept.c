@@ -1,0 +1,55 @@
+#include "server/http/accept.h"
+#include <stddef.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+
+/* The quality, 0 to 1, that the most specific matching range gives to `type`; -1: none matches.
+ * *exact is true when the type itself is named. */
+static double quality(const char *accept, const char *type, bool *exact)
+{
+    size_t type_bytes = strlen(type), major = (size_t)(strchr(type, '/') - type) + 1;
+    double best = -1;
+    int best_level = 0;
+    for (const char *at = accept; at;) {
+        at += strspn(at, " \t,");
+        size_t item = strcspn(at, ","), range = strcspn(at, ",; \t");
+        int level = 0;
+        if (range == type_bytes && !strncasecmp(at, type, type_bytes))
+            level = 3;
+        else if (range == major + 1 && at[major] == '*' && !strncasecmp(at, type, major))
+            level = 2;
+        else if (range == 3 && !strncmp(at, "*/*", 3))
+            level = 1;
+        if (level > best_level) {
+            double q = 1;
+            for (const char *p = memchr(at, ';', item); p && p < at + item;) {
+                p++;
+                p += strspn(p, " \t");
+                if ((*p == 'q' || *p == 'Q') && p[1] == '=')
+                    q = strtod(p + 2, NULL);
+                p = memchr(p, ';', (size_t)(at + item - p));
+            }
+            best = q;
+            best_level = level;
+        }
+        at = at[item] ? at + item + 1 : NULL;
+    }
+    if (exact)
+        *exact = best_level == 3;
+    return best;
+}
+
+bool accept_allows(const char *accept, const char *type)
+{
+    return !accept || quality(accept, type, NULL) > 0;
+}
+
+bool accept_record(const char *accept)
+{
+    bool exact = false;
+    if (!accept)
+        return false;
+    double json = quality(accept, "application/json", &exact);
+    return exact && json > 0 && json >= quality(accept, "image/png", NULL);
+}

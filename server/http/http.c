@@ -1,0 +1,450 @@
+#include "server/http/http.h"
+#include "protocol/memory.h"
+#include "server/base/clock.h"
+#include <arpa/inet.h>
+#include <ctype.h>
+#include <errno.h>
+#include <microhttpd.h>
+#include <netdb.h>
+#include <poll.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+#include <sys/random.h>
+#include <sys/uio.h>
+#include <unistd.h>
+
+#define SWALLOW_BYTES (64u << 10) /* a refused body this small is read, to keep the connection */
+#define CONNECTION_MEMORY (64u << 10)
+#define LINGER_SPARE 64
+
+struct http_listener {
+    struct http_config config;
+    struct MHD_Daemon *daemon;
+    struct door *door;
+    uint32_t active; /* atomic */
+    bool draining;   /* atomic */
+};
+
+static void fill_request_id(char text[33])
+{
+    uint8_t random[16];
+    if (getrandom(random, sizeof random, 0) != sizeof random)
+        abort();
+    for (int i = 0; i < 16; i++)
+        snprintf(text + 2 * i, 3, "%02x", random[i]);
+}
+
+/* ---- the header: what libmicrohttpd lets through and we do not ---- */
+
+struct framing {
+    uint32_t lengths, encodings, hosts, count;
+    uint64_t length;
+    bool chunked;
+    const char *fault;
+};
+
+static bool is_token(const char *text, size_t bytes)
+{
+    for (size_t i = 0; i < bytes; i++)
+        if (!isalnum((unsigned char)text[i]) && !strchr("!#$%&'*+-.^_`|~", text[i]))
+            return false;
+    return bytes > 0;
+}
+
+static enum MHD_Result look_at_header(void *context, enum MHD_ValueKind kind, const char *name,
+    size_t name_bytes, const char *value, size_t value_bytes)
+{
+    (void)kind;
+    struct framing *f = context;
+    f->count++;
+    if (!is_token(name, name_bytes))
+        f->fault = "A header has an invalid name.";
+    for (size_t i = 0; i < value_bytes; i++)
+        if (((unsigned char)value[i] < 0x20 && value[i] != '\t') || value[i] == 0x7f)
+            f->fault = "A header has a control character in its value.";
+    if (name_bytes == 14 && !strncasecmp(name, "Content-Length", 14)) {
+        f->lengths++;
+        f->length = 0;
+        if (value_bytes == 0 || value_bytes > 18)
+            f->fault = "Content-Length is not a number.";
+        for (size_t i = 0; i < value_bytes && !f->fault; i++) {
+            if (!isdigit((unsigned char)value[i]))
+                f->fault = "Content-Length is not a number.";
+            f->length = f->length * 10 + (uint64_t)(value[i] - '0');
+        }
+    } else if (name_bytes == 17 && !strncasecmp(name, "Transfer-Encoding", 17)) {
+        f->encodings++;
+        f->chunked = value_bytes == 7 && !strncasecmp(value, "chunked", 7);
+        if (!f->chunked)
+            f->fault = "The only transfer coding is chunked.";
+    } else if (name_bytes == 4 && !strncasecmp(name, "Host", 4)) {
+        f->hosts++;
+    }
+    return MHD_YES;
+}
+
+static bool check_framing(struct http_exchange *x, const char *version, struct pen_error *error)
+{
+    struct framing f = {0};
+    MHD_get_connection_values_n(x->connection, MHD_HEADER_KIND, look_at_header, &f);
+    bool http11 = !strcmp(version, "HTTP/1.1");
+    if (!f.fault && !http11 && strcmp(version, "HTTP/1.0"))
+        f.fault = "The HTTP version is not supported.";
+    if (!f.fault && f.lengths > 1)
+        f.fault = "There is more than one Content-Length.";
+    if (!f.fault && f.encodings && (f.lengths || f.encodings > 1 || !http11))
+        f.fault = "The length of the body is ambiguous.";
+    if (!f.fault && (f.hosts > 1 || (http11 && f.hosts == 0)))
+        f.fault = "There must be exactly one Host.";
+    bool can_have_body =
+        !strcmp(x->method, "POST") || !strcmp(x->method, "PUT") || !strcmp(x->method, "PATCH");
+    if (!f.fault && !can_have_body && (f.chunked || f.length))
+        f.fault = "This method has no body.";
+    x->content_length = f.chunked ? HTTP_UNKNOWN_LENGTH : f.length;
+    if (f.fault)
+        return pen_fail(error, PEN_MALFORMED, "", "%s", f.fault);
+    return true;
+}
+
+/* Splits the raw request target; refuses what no route could mean. */
+static bool check_target(struct http_exchange *x, struct pen_error *error)
+{
+    for (const char *c = x->path; *c; c++)
+        if (*c <= 0x20 || *c >= 0x7f || *c == '#')
+            return pen_fail(error, PEN_MALFORMED, "", "The request target is malformed.");
+    if (strlen(x->path) > HTTP_MAX_TARGET)
+        return pen_fail(error, PEN_URI_TOO_LONG, "", "The request target is too long.");
+    for (const char *scheme = "http://"; scheme; scheme = scheme[4] == ':' ? "https://" : NULL) {
+        size_t n = strlen(scheme);
+        if (!strncasecmp(x->path, scheme, n)) { /* the form that proxies use */
+            size_t authority = strcspn(x->path + n, "/?");
+            memmove(x->path, x->path + n + authority, strlen(x->path + n + authority) + 1);
+            break;
+        }
+    }
+    if (*x->path != '/')
+        return pen_fail(error, PEN_MALFORMED, "", "The request target is not a path.");
+    char *mark = strchr(x->path, '?');
+    if (mark) {
+        *mark = 0;
+        x->query = mark + 1;
+    }
+    return true;
+}
+
+/* ---- answering ---- */
+
+const char *http_header(const struct http_exchange *x, const char *name)
+{
+    return MHD_lookup_connection_value(x->connection, MHD_HEADER_KIND, name);
+}
+
+void http_add_header(struct http_exchange *x, const char *name, const char *format, ...)
+{
+    if (x->header_count == HTTP_MAX_HEADERS)
+        return;
+    struct http_header *header = &x->headers[x->header_count++];
+    snprintf(header->name, sizeof header->name, "%s", name);
+    va_list args;
+    va_start(args, format);
+    vsnprintf(header->value, sizeof header->value, format, args);
+    va_end(args);
+}
+
+void http_answer(
+    struct http_exchange *x, uint32_t status, const char *content_type, struct http_body body)
+{
+    if (content_type)
+        http_add_header(x, "Content-Type", "%s", content_type);
+    x->status = status;
+    x->body = body;
+    x->answered = true;
+    if (x->deferred)
+        MHD_resume_connection(x->connection); /* from here on the exchange may be gone */
+}
+
+void http_defer(struct http_exchange *x)
+{
+    x->deferred = true;
+    MHD_suspend_connection(x->connection);
+}
+
+bool http_client_is_gone(const struct http_exchange *x)
+{
+    struct pollfd watch = {x->fd, POLLRDHUP, 0};
+    return poll(&watch, 1, 0) > 0 && (watch.revents & (POLLRDHUP | POLLHUP | POLLERR));
+}
+
+static void free_text(void *text)
+{
+    free(text);
+}
+
+struct http_body http_text(char *text)
+{
+    return (struct http_body){text, strlen(text), free_text, text};
+}
+
+struct http_body http_static(const void *data, size_t size)
+{
+    return (struct http_body){data, size, NULL, NULL};
+}
+
+static bool is_draining(const struct http_listener *listener)
+{
+    return __atomic_load_n(&listener->draining, __ATOMIC_ACQUIRE);
+}
+
+/* Hands the answer to libmicrohttpd. */
+static enum MHD_Result queue(struct http_exchange *x)
+{
+    struct http_listener *listener = x->listener;
+    struct MHD_Response *response = MHD_create_response_from_buffer(
+        x->body.size, (void *)x->body.data, MHD_RESPMEM_PERSISTENT); /* released in completed() */
+    if (!response)
+        return MHD_NO;
+    bool complete = true;
+    for (uint32_t i = 0; i < x->header_count; i++)
+        complete = complete && MHD_add_response_header(
+                                   response, x->headers[i].name, x->headers[i].value) == MHD_YES;
+    if (x->closes || is_draining(listener))
+        MHD_add_response_header(response, "Connection", "close");
+    x->queued = true;
+    door_set(listener->door, x->fd, DOOR_SENDING, x->body.size);
+    enum MHD_Result result =
+        complete ? MHD_queue_response(x->connection, x->status, response) : MHD_NO;
+    MHD_destroy_response(response);
+    return result;
+}
+
+/* In the middle of a body libmicrohttpd takes no answer: it is written past it, and
+ * the connection ends. */
+static enum MHD_Result break_off(struct http_exchange *x)
+{
+    struct http_listener *listener = x->listener;
+    if (listener->config.door.plain) {
+        char head[4096];
+        int n = snprintf(head, sizeof head,
+            "HTTP/1.1 %u %s\r\nConnection: close\r\nContent-Length: %zu\r\n", x->status,
+            pen_code_title(x->status), x->body.size);
+        for (uint32_t i = 0; i < x->header_count && n < (int)sizeof head - 700; i++)
+            n += snprintf(head + n, sizeof head - (size_t)n, "%s: %s\r\n", x->headers[i].name,
+                x->headers[i].value);
+        n += snprintf(head + n, sizeof head - (size_t)n, "\r\n");
+        struct iovec parts[] = {{head, (size_t)n}, {(void *)x->body.data, x->body.size}};
+        struct msghdr message = {.msg_iov = parts, .msg_iovlen = 2};
+        if (sendmsg(x->fd, &message, MSG_DONTWAIT | MSG_NOSIGNAL) < 0)
+            x->aborted = true;
+        door_linger(listener->door, x->fd);
+    }
+    x->queued = true;
+    return MHD_NO;
+}
+
+/* ---- libmicrohttpd's callbacks ---- */
+
+static void *on_target(void *context, const char *target, struct MHD_Connection *connection)
+{
+    struct http_listener *listener = context;
+    struct http_exchange *x = pen_alloc_zero(1, sizeof *x);
+    size_t bytes = strlen(target) + 1;
+    x->path = memcpy(pen_alloc(bytes, 1), target, bytes);
+    x->listener = listener;
+    x->connection = connection;
+    x->fd = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD)->connect_fd;
+    door_set(listener->door, x->fd, DOOR_HEADER, 0);
+    return x;
+}
+
+static enum MHD_Result begin(struct http_exchange *x, const char *method, const char *version)
+{
+    struct http_listener *listener = x->listener;
+    const struct http_callbacks *callbacks = listener->config.callbacks;
+    struct pen_error framing = {0};
+    const struct sockaddr *address =
+        MHD_get_connection_info(x->connection, MHD_CONNECTION_INFO_CLIENT_ADDRESS)->client_addr;
+    x->begun = true;
+    x->method = method;
+    x->header_ns = x->body_ns = clock_now_ns();
+    fill_request_id(x->request_id);
+    if (!address || getnameinfo(address,
+                        address->sa_family == AF_INET6 ? sizeof(struct sockaddr_in6)
+                                                       : sizeof(struct sockaddr_in),
+                        x->client, sizeof x->client, NULL, 0, NI_NUMERICHOST))
+        strcpy(x->client, "unknown");
+    __atomic_add_fetch(&listener->active, 1, __ATOMIC_ACQ_REL);
+    bool ok = check_framing(x, version, &framing) && check_target(x, &framing);
+    bool has_body = x->content_length != 0;
+    door_set(listener->door, x->fd, has_body ? DOOR_BODY : DOOR_BUSY, 0);
+    if (!ok) {
+        x->closes = true; /* what follows on this connection cannot be told apart */
+        door_linger(listener->door, x->fd);
+    }
+    callbacks->begin(x, &framing);
+    if (!x->answered || !has_body)
+        return x->answered && x->closes ? queue(x) : MHD_YES;
+    /* Refused with a body to come. A small one is read first, so that the connection lives on. */
+    if (ok && x->content_length <= SWALLOW_BYTES && !http_header(x, "Expect"))
+        return MHD_YES;
+    x->closes = true;
+    door_linger(listener->door, x->fd);
+    return queue(x);
+}
+
+static enum MHD_Result on_request(void *context, struct MHD_Connection *connection, const char *url,
+    const char *method, const char *version, const char *data, size_t *bytes, void **user)
+{
+    (void)context, (void)url, (void)connection;
+    struct http_exchange *x = *user;
+    const struct http_callbacks *callbacks = x->listener->config.callbacks;
+    if (!x->begun)
+        return begin(x, method, version);
+    if (*bytes) {
+        x->received += *bytes;
+        door_received(x->listener->door, x->fd, *bytes);
+        if (!x->answered) {
+            callbacks->body(x, data, *bytes);
+            if (x->answered)
+                return break_off(x);
+        }
+        *bytes = 0;
+        return MHD_YES;
+    }
+    if (!x->body_done) {
+        x->body_done = true;
+        x->body_ns = clock_now_ns();
+        door_set(x->listener->door, x->fd, DOOR_BUSY, 0);
+        if (!x->answered) {
+            callbacks->end(x);
+            if (x->deferred)
+                return MHD_YES; /* another thread may be answering by now */
+        }
+    }
+    return x->queued ? MHD_YES : queue(x);
+}
+
+static void on_completed(void *context, struct MHD_Connection *connection, void **user,
+    enum MHD_RequestTerminationCode code)
+{
+    struct http_listener *listener = context;
+    (void)connection;
+    struct http_exchange *x = *user;
+    if (!x)
+        return;
+    *user = NULL;
+    if (x->begun) {
+        x->aborted = x->aborted || code != MHD_REQUEST_TERMINATED_COMPLETED_OK;
+        listener->config.callbacks->completed(x);
+        if (x->answered && x->body.release)
+            x->body.release(x->body.owner);
+    }
+    door_set(listener->door, x->fd, DOOR_WAITING, 0);
+    if (x->begun)
+        __atomic_sub_fetch(&listener->active, 1, __ATOMIC_ACQ_REL);
+    free(x->path);
+    free(x);
+}
+
+static void on_connection(void *context, struct MHD_Connection *connection, void **user,
+    enum MHD_ConnectionNotificationCode code)
+{
+    struct http_listener *listener = context;
+    (void)user;
+    if (code == MHD_CONNECTION_NOTIFY_CLOSED)
+        door_forget(listener->door,
+            MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD)->connect_fd);
+}
+
+static void on_socket(void *context, int fd, const struct sockaddr *address, socklen_t bytes)
+{
+    struct http_listener *listener = context;
+    if (MHD_add_connection(listener->daemon, fd, address, bytes) != MHD_YES)
+        door_forget(listener->door, fd);
+}
+
+static void no_log(void *context, const char *format, va_list args)
+{
+    (void)context, (void)format, (void)args; /* its messages are about clients, not about us */
+}
+
+struct http_listener *http_listener_create(
+    const struct http_config *config, struct pen_error *error)
+{
+    struct http_listener *listener = pen_alloc_zero(1, sizeof *listener);
+    listener->config = *config;
+    bool tls = config->cert_pem != NULL;
+    struct door_config *door = &listener->config.door;
+    door->plain = !tls;
+    door->on_socket = on_socket;
+    door->context = listener;
+    /* libmicrohttpd's own limit is divided among its threads and silent: ours comes long before. */
+    unsigned limit = (door->connections + LINGER_SPARE) * config->threads;
+    unsigned flags = MHD_USE_EPOLL_INTERNAL_THREAD | MHD_USE_NO_LISTEN_SOCKET |
+                     MHD_ALLOW_SUSPEND_RESUME | MHD_USE_ITC | MHD_USE_ERROR_LOG |
+                     (tls ? MHD_USE_TLS : 0);
+    struct MHD_OptionItem tls_options[] = {
+        {MHD_OPTION_HTTPS_MEM_CERT, 0, config->cert_pem},
+        {MHD_OPTION_HTTPS_MEM_KEY, 0, config->key_pem},
+        {MHD_OPTION_END, 0, NULL},
+    };
+    struct MHD_OptionItem pool_options[] = {
+        {MHD_OPTION_THREAD_POOL_SIZE, config->threads, NULL},
+        {MHD_OPTION_END, 0, NULL},
+    };
+    struct MHD_OptionItem none[] = {{MHD_OPTION_END, 0, NULL}};
+    listener->daemon = MHD_start_daemon(flags, 0, NULL, NULL, on_request, listener,
+        MHD_OPTION_EXTERNAL_LOGGER, no_log, NULL, MHD_OPTION_URI_LOG_CALLBACK, on_target, listener,
+        MHD_OPTION_NOTIFY_COMPLETED, on_completed, listener, MHD_OPTION_NOTIFY_CONNECTION,
+        on_connection, listener, MHD_OPTION_CONNECTION_LIMIT, limit,
+        MHD_OPTION_CONNECTION_MEMORY_LIMIT, (size_t)CONNECTION_MEMORY,
+        MHD_OPTION_CONNECTION_TIMEOUT, 0u, MHD_OPTION_STRICT_FOR_CLIENT, -1, MHD_OPTION_ARRAY,
+        config->threads > 1 ? pool_options : none, MHD_OPTION_ARRAY, tls ? tls_options : none,
+        MHD_OPTION_END);
+    if (!listener->daemon) {
+        pen_fail(error, PEN_UNAVAILABLE, "",
+            tls ? "The TLS listener cannot start: are certificate and key valid PEM?"
+                : "The HTTP listener cannot start.");
+        free(listener);
+        return NULL;
+    }
+    listener->door = door_create(&listener->config.door, error);
+    if (!listener->door) {
+        MHD_stop_daemon(listener->daemon);
+        free(listener);
+        return NULL;
+    }
+    door_start(listener->door);
+    return listener;
+}
+
+void *http_listener_context(const struct http_listener *listener)
+{
+    return listener->config.context;
+}
+
+struct door *http_listener_door(const struct http_listener *listener)
+{
+    return listener->door;
+}
+
+uint32_t http_listener_active(const struct http_listener *listener)
+{
+    return __atomic_load_n(&listener->active, __ATOMIC_ACQUIRE);
+}
+
+void http_listener_drain(struct http_listener *listener)
+{
+    __atomic_store_n(&listener->draining, true, __ATOMIC_RELEASE);
+    door_close(listener->door);
+}
+
+void http_listener_destroy(struct http_listener *listener)
+{
+    door_close_idle(listener->door);
+    MHD_stop_daemon(listener->daemon);
+    door_destroy(listener->door);
+    free(listener);
+}

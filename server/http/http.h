@@ -1,0 +1,97 @@
+/* HTTP listeners over libmicrohttpd; http.c is the only file that knows it. An exchange is one
+ * request and its answer. Callbacks run on the listener's threads and must not block for long. */
+#pragma once
+#include "protocol/error.h"
+#include "server/http/door.h"
+
+#define HTTP_MAX_TARGET 8192
+#define HTTP_MAX_HEADERS 16
+#define HTTP_UNKNOWN_LENGTH UINT64_MAX
+
+struct http_listener;
+
+/* Bytes to send; `release(owner)` is called when they are no longer needed (NULL: static). */
+struct http_body {
+    const void *data;
+    size_t size;
+    void (*release)(void *owner);
+    void *owner;
+};
+
+struct http_header {
+    char name[40], value[600];
+};
+
+struct http_exchange {
+    struct http_listener *listener;
+    const char *method;
+    char *path;      /* as sent, up to '?'; nothing decoded */
+    char *query;     /* as sent, behind '?', or NULL */
+    char client[64]; /* numeric address */
+    char request_id[33];
+    uint64_t content_length;     /* 0: no body, HTTP_UNKNOWN_LENGTH: chunked */
+    uint64_t header_ns, body_ns; /* when the header and the body were complete */
+    void *user;                  /* the owner's */
+    /* The answer, for the log: */
+    uint32_t status;
+    struct http_body body;
+    bool aborted; /* the client did not get all of the answer */
+    /* http.c's own: */
+    struct http_header headers[HTTP_MAX_HEADERS];
+    uint32_t header_count;
+    void *connection;
+    int fd;
+    bool begun, answered, deferred, queued, closes, body_done;
+    uint64_t received;
+};
+
+struct http_callbacks {
+    /* The header is complete. `framing` is filled when the request must be refused and the
+     * connection closed: then it must be answered here. Otherwise it may be answered here. */
+    void (*begin)(struct http_exchange *exchange, const struct pen_error *framing);
+    /* A piece of the body; answering here ends the request. */
+    void (*body)(struct http_exchange *exchange, const void *data, size_t bytes);
+    /* The body is complete: must answer or defer. */
+    void (*end)(struct http_exchange *exchange);
+    /* The answer was sent or the client lost; the exchange is freed after this. Called once for
+     * every exchange that had `begin`. */
+    void (*completed)(struct http_exchange *exchange);
+};
+
+struct http_config {
+    struct door_config door; /* plain, on_socket and context are filled in */
+    const struct http_callbacks *callbacks;
+    void *context;
+    uint32_t threads;
+    char *cert_pem, *key_pem; /* both NULL: no TLS; must outlive the listener */
+};
+
+struct http_listener *http_listener_create(
+    const struct http_config *config, struct pen_error *error);
+void *http_listener_context(const struct http_listener *listener);
+struct door *http_listener_door(const struct http_listener *listener);
+/* Exchanges between `begin` and `completed`. */
+uint32_t http_listener_active(const struct http_listener *listener);
+/* Accepts no new connection; every answer from now on closes its connection. */
+void http_listener_drain(struct http_listener *listener);
+/* Nothing may be deferred any more. */
+void http_listener_destroy(struct http_listener *listener);
+
+/* A header of the request, or NULL. */
+const char *http_header(const struct http_exchange *exchange, const char *name);
+/* Adds a header to the answer, before http_answer. */
+void http_add_header(struct http_exchange *exchange, const char *name, const char *format, ...)
+    __attribute__((format(printf, 3, 4)));
+/* Answers; content_type may be NULL when there is no body. Within a callback, or from any thread
+ * once after http_defer. Takes the body. */
+void http_answer(struct http_exchange *exchange, uint32_t status, const char *content_type,
+    struct http_body body);
+/* The answer comes later, from http_answer. Only inside `end`, and before the work is handed to
+ * another thread; the exchange must not be touched afterwards by the caller. */
+void http_defer(struct http_exchange *exchange);
+/* The client has hung up. Any thread, while deferred. */
+bool http_client_is_gone(const struct http_exchange *exchange);
+
+/* A body that is malloc'd text. */
+struct http_body http_text(char *text);
+struct http_body http_static(const void *data, size_t size);

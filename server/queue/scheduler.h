@@ -1,0 +1,83 @@
+/* The bounded queue between connections and workers. A render is one unit of work; every client
+ * that asks for the same picture at the same time waits on the same render. */
+#pragma once
+#include "protocol/request.h"
+#include "server/store/picture.h"
+
+/* How a render ended for one client. */
+struct outcome {
+    struct pen_error error;  /* PEN_OK: there is a picture */
+    struct picture *picture; /* borrowed for the call */
+    double queue_ms, run_ms; /* before and after a worker took it */
+    uint32_t retry_after_s;  /* with 429 and 503 */
+    bool shared;             /* another client's request rendered it */
+    /* Of measurements, borrowed like the picture: */
+    const struct pen_result *result; /* also when nothing was encoded */
+    int planes_fd;                   /* of a reference; 0: none */
+    struct picture *maps[3];         /* enum channel_map; NULL: none */
+};
+
+/* One client waiting. The owner keeps it alive from a successful scheduler_submit until `finish`,
+ * which is called exactly once, from any thread, with no lock held. */
+struct waiter {
+    struct waiter *next;
+    uint64_t deadline_ns;                   /* monotonic */
+    uint64_t client;                        /* whose share it uses; 0: nobody's */
+    bool (*is_gone)(struct waiter *waiter); /* the client has hung up; may be NULL */
+    void (*finish)(struct waiter *waiter, const struct outcome *outcome);
+    uint32_t measure; /* enum channel_measure; what is measured is never shared */
+    int reference_fd; /* planes to compare with, needed until scheduler_submit returns; 0: none */
+};
+
+struct render {
+    struct render *next;
+    uint64_t id;
+    struct pen_request request;
+    uint8_t key[PEN_ID_BYTES];
+    struct waiter *waiters;
+    uint64_t queued_ns, taken_ns;
+    uint64_t last_deadline_ns;
+    bool shareable, running, batch;
+    uint32_t measure;
+    int reference_fd;         /* the render's own; 0: none */
+    uint32_t attempts, kills; /* kept by the worker pool */
+};
+
+struct scheduler_limits {
+    uint32_t queue, client_share, workers;
+};
+struct scheduler;
+/* `on_work(context)` is called, with no lock held, whenever there is something to take. */
+struct scheduler *scheduler_create(
+    const struct scheduler_limits *limits, void (*on_work)(void *context), void *context);
+void scheduler_destroy(struct scheduler *scheduler); /* nothing may be queued or running */
+
+/* Queues a request, or joins one that is queued or running when `shareable`. Errors, with the
+ * waiter untouched: PEN_TOO_MANY (share used up), PEN_UNAVAILABLE (full or draining), and then
+ * *retry_after_s. A success uses one unit of the client's share until scheduler_release. */
+bool scheduler_submit(struct scheduler *scheduler, const struct pen_request *request,
+    const uint8_t key[PEN_ID_BYTES], bool shareable, struct waiter *waiter, uint32_t *retry_after_s,
+    struct pen_error *error);
+void scheduler_release(struct scheduler *scheduler, uint64_t client);
+
+/* The next render that somebody still waits for, interactive before batch; NULL: none. The caller
+ * gives it back with scheduler_return (to be taken again, first) or scheduler_finish. */
+struct render *scheduler_take(struct scheduler *scheduler);
+void scheduler_return(struct scheduler *scheduler, struct render *render);
+/* Answers everybody who waits and frees the render. */
+void scheduler_finish(
+    struct scheduler *scheduler, struct render *render, const struct outcome *outcome);
+
+/* Answers 504 to those whose deadline has passed; returns the next deadline, UINT64_MAX: none. */
+uint64_t scheduler_expire(struct scheduler *scheduler);
+/* From now on nothing is accepted. */
+void scheduler_drain(struct scheduler *scheduler);
+/* Answers 503 to everybody who still waits. */
+void scheduler_cancel(struct scheduler *scheduler);
+
+struct scheduler_numbers {
+    uint32_t queued, running, waiting; /* renders, renders, clients */
+    uint64_t refused_full, refused_share, expired, abandoned, shared;
+    bool full, draining;
+};
+void scheduler_read(struct scheduler *scheduler, struct scheduler_numbers *numbers);

@@ -1,0 +1,221 @@
+/* The admin listener: /livez, /readyz and /metrics. Busy is not ready, but never not live. */
+#include "protocol/memory.h"
+#include "server/base/clock.h"
+#include "server/base/log.h"
+#include "server/routes/routes.h"
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define CANARY_DEADLINE_MS 5000
+#define CANARY_SIDE 32
+
+struct probe {
+    struct waiter waiter;
+    struct http_exchange *exchange;
+    struct service *service;
+};
+
+static void answer_text(struct http_exchange *x, uint32_t status, const char *text)
+{
+    http_add_header(x, "Cache-Control", "no-store");
+    if (status == 503)
+        http_add_header(x, "Retry-After", "1");
+    http_answer(x, status, "text/plain; charset=utf-8", http_static(text, strlen(text)));
+}
+
+/* ---- readiness ---- */
+
+static void finish_canary(struct waiter *waiter, const struct outcome *outcome)
+{
+    struct probe *probe = (struct probe *)waiter;
+    struct service *s = probe->service;
+    struct http_exchange *x = probe->exchange;
+    bool ok = outcome->error.code == PEN_OK;
+    pthread_mutex_lock(&s->canary_lock);
+    s->canary_ns = clock_now_ns();
+    s->canary_failed = !ok;
+    pthread_mutex_unlock(&s->canary_lock);
+    if (!ok)
+        log_event(LOG_ERROR, "the canary was not rendered: %s", outcome->error.message);
+    answer_text(x, ok ? 200 : 503, ok ? "ready\n" : "A test render failed.\n");
+}
+
+static void readyz(struct http_exchange *x, struct service *s)
+{
+    const char *obstacle = service_obstacle(s);
+    if (obstacle) {
+        answer_text(x, 503, obstacle);
+        return;
+    }
+    pthread_mutex_lock(&s->canary_lock);
+    uint64_t now = clock_now_ns();
+    bool recent = s->canary_ns && now - s->canary_ns < s->config->canary_interval_ms * CLOCK_MS;
+    bool failed = s->canary_failed;
+    pthread_mutex_unlock(&s->canary_lock);
+    if (recent && !failed) {
+        answer_text(x, 200, "ready\n");
+        return;
+    }
+    struct pen_request request;
+    struct pen_error error = {0};
+    uint8_t key[PEN_ID_BYTES];
+    uint32_t retry_after_s;
+    struct probe *probe = pen_alloc_zero(1, sizeof *probe);
+    x->user = probe;
+    probe->exchange = x;
+    probe->service = s;
+    probe->waiter.deadline_ns = now + CANARY_DEADLINE_MS * CLOCK_MS;
+    probe->waiter.finish = finish_canary;
+    pen_request_default(&request, s->catalogue);
+    memcpy(request.scene, s->canary_id, PEN_ID_BYTES);
+    request.width = request.height = CANARY_SIDE;
+    picture_key(&request, key);
+    http_defer(x);
+    if (!scheduler_submit(
+            s->scheduler, &request, key, true, &probe->waiter, &retry_after_s, &error))
+        answer_text(x, 503, "The queue is full.\n");
+}
+
+/* ---- numbers ---- */
+
+static void write_service(struct service *s, struct metrics_text *text)
+{
+    struct worker_pool_numbers pool;
+    struct scheduler_numbers queue;
+    struct importer_numbers imports;
+    struct result_cache_numbers cache;
+    struct door_numbers door;
+    worker_pool_read(s->pool, &pool);
+    scheduler_read(s->scheduler, &queue);
+    importer_read(s->importer, &imports);
+    result_cache_read(s->cache, &cache);
+    door_read(http_listener_door(s->listener), &door);
+    if (pool.has_device) {
+        char renderer[sizeof pool.device.renderer];
+        char *to = renderer;
+        for (const char *c = pool.device.renderer; *c; c++)
+            *to++ = *c == '"' || *c == '\\' || *c == '\n' ? '_' : *c;
+        *to = 0;
+        metrics_print(text,
+            "# HELP penumbra_device_info What renders.\n"
+            "# TYPE penumbra_device_info gauge\n"
+            "penumbra_device_info{renderer=\"%s\",platform=\"%s\",software=\"%u\","
+            "version=\"" PENUMBRA_VERSION "\"} 1\n",
+            renderer, pool.device.platform, pool.device.software != 0);
+    }
+    const struct {
+        const char *name, *type, *help;
+        double value;
+    } rows[] = {
+        {"penumbra_uptime_seconds", "gauge", "Since the start.",
+            clock_ms(clock_now_ns() - s->started_ns) / 1e3},
+        {"penumbra_ready", "gauge", "1: takes renders.", service_obstacle(s) == NULL},
+        {"penumbra_draining", "gauge", "1: shutting down.", service_is_draining(s)},
+        {"penumbra_workers_up", "gauge", "Workers that take jobs.", pool.up},
+        {"penumbra_worker_restarts_total", "counter", "Workers that ended.", pool.restarts},
+        {"penumbra_worker_crashes_total", "counter", "Of these, by their own fault.", pool.crashes},
+        {"penumbra_worker_hangs_total", "counter", "Of these, by the watchdog.", pool.hangs},
+        {"penumbra_render_retries_total", "counter", "Renders given to another worker.",
+            pool.retries},
+        {"penumbra_worker_back_seconds", "gauge", "From a worker's end to its successor's hello.",
+            pool.back_ms / 1e3},
+        {"penumbra_worker_warm_up_seconds", "gauge", "The last warm-up.", pool.warm_ms / 1e3},
+        {"penumbra_worker_context_seconds", "gauge", "The last context's creation.",
+            pool.create_ms / 1e3},
+        {"penumbra_quarantined_scenes", "gauge", "Scenes that ended two workers.",
+            pool.quarantined},
+        {"penumbra_gpu_bytes", "gauge", "Scenes, images and shadow inputs in GPU memory.",
+            (double)pool.gpu_bytes},
+        {"penumbra_queue_depth", "gauge", "Renders that wait.", queue.queued},
+        {"penumbra_queue_limit", "gauge", "Renders that may wait.", (double)s->config->queue_limit},
+        {"penumbra_renders_running", "gauge", "Renders on a worker.", queue.running},
+        {"penumbra_renders_shared_total", "counter", "Requests that joined another's render.",
+            (double)queue.shared},
+        {"penumbra_renders_refused_full_total", "counter", "503: the queue was full.",
+            (double)queue.refused_full},
+        {"penumbra_renders_refused_share_total", "counter", "429: the client's share was used up.",
+            (double)queue.refused_share},
+        {"penumbra_renders_expired_total", "counter", "504: the deadline passed.",
+            (double)queue.expired},
+        {"penumbra_renders_abandoned_total", "counter", "Clients that hung up before their turn.",
+            (double)queue.abandoned},
+        {"penumbra_cache_bytes", "gauge", "Encoded images kept.", (double)cache.bytes},
+        {"penumbra_cache_hits_total", "counter", "Images from the cache.", (double)cache.hits},
+        {"penumbra_cache_misses_total", "counter", "Images not in the cache.",
+            (double)cache.misses},
+        {"penumbra_cache_evictions_total", "counter", "Images dropped for room.",
+            (double)cache.evictions},
+        {"penumbra_imports_waiting", "gauge", "Uploads that wait for their import.",
+            imports.waiting},
+        {"penumbra_imports_running", "gauge", "Importer processes.", imports.running},
+        {"penumbra_imports_done_total", "counter", "Imports.", (double)imports.done},
+        {"penumbra_imports_failed_total", "counter", "Uploads refused.", (double)imports.failed},
+        {"penumbra_imports_crashed_total", "counter", "Importers that ended without a report.",
+            (double)imports.crashed},
+        {"penumbra_scenes", "gauge", "Scenes in the store.",
+            scene_store_count(s->store, STORE_SCENES)},
+        {"penumbra_images", "gauge", "Images in the store.",
+            scene_store_count(s->store, STORE_IMAGES)},
+        {"penumbra_connections", "gauge", "Open public connections.", door.open},
+        {"penumbra_connections_accepted_total", "counter", "Public connections.",
+            (double)door.accepted},
+        {"penumbra_connections_refused_total", "counter", "Connections above the limits.",
+            (double)door.refused},
+        {"penumbra_connections_too_slow_total", "counter", "Connections ended as too slow.",
+            (double)door.too_slow},
+        {"penumbra_received_bytes_total", "counter", "Request bodies.",
+            (double)__atomic_load_n(&s->bytes_received, __ATOMIC_RELAXED)},
+        {"penumbra_sent_bytes_total", "counter", "Answer bodies.",
+            (double)__atomic_load_n(&s->bytes_sent, __ATOMIC_RELAXED)},
+    };
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++)
+        metrics_print_one(text, rows[i].name, rows[i].type, rows[i].help, rows[i].value);
+}
+
+static void metrics_page(struct http_exchange *x, struct service *s)
+{
+    struct metrics_text text = {0};
+    write_service(s, &text);
+    metrics_write(s->metrics, &text);
+    http_answer(x, 200, "text/plain; version=0.0.4; charset=utf-8", http_text(text.text));
+}
+
+/* ---- callbacks ---- */
+
+static void begin(struct http_exchange *x, const struct pen_error *framing)
+{
+    bool get = !strcmp(x->method, "GET") || !strcmp(x->method, "HEAD");
+    if (framing->code != PEN_OK) {
+        answer_text(x, framing->code, "The request is malformed.\n");
+    } else if (!get) {
+        http_add_header(x, "Allow", "GET, HEAD");
+        answer_text(x, 405, "This listener takes GET and HEAD.\n");
+    }
+}
+
+static void body(struct http_exchange *x, const void *data, size_t bytes)
+{
+    (void)data, (void)bytes;
+    answer_text(x, 413, "This listener takes no bodies.\n");
+}
+
+static void end(struct http_exchange *x)
+{
+    struct service *s = http_listener_context(x->listener);
+    if (!strcmp(x->path, "/livez"))
+        answer_text(x, 200, "live\n");
+    else if (!strcmp(x->path, "/readyz"))
+        readyz(x, s);
+    else if (!strcmp(x->path, "/metrics"))
+        metrics_page(x, s);
+    else
+        answer_text(x, 404, "There are /livez, /readyz and /metrics.\n");
+}
+
+static void completed(struct http_exchange *x)
+{
+    free(x->user);
+}
+
+const struct http_callbacks routes_admin_callbacks = {begin, body, end, completed};

@@ -1,0 +1,132 @@
+/* What the service tells about itself: pages, contract, methods, numbers. */
+#include "protocol/json_result.h"
+#include "server/base/clock.h"
+#include "server/pages/pages.h"
+#include "server/routes/routes.h"
+#include <stdlib.h>
+#include <string.h>
+
+static void answer_page(struct call *call, const char *text, size_t bytes)
+{
+    http_add_header(call->exchange, "Content-Security-Policy",
+        "default-src 'self'; style-src 'self' 'unsafe-inline'; script-src 'self' 'unsafe-inline'; "
+        "img-src 'self' blob:; frame-ancestors 'none'; base-uri 'none'");
+    http_add_header(call->exchange, "Cache-Control", "no-cache");
+    http_answer(call->exchange, 200, "text/html; charset=utf-8", http_static(text, bytes));
+}
+
+void routes_home(struct call *call)
+{
+    answer_page(call, page_home, (size_t)(page_home_end - page_home));
+}
+
+void routes_docs(struct call *call)
+{
+    answer_page(call, page_docs, (size_t)(page_docs_end - page_docs));
+}
+
+void routes_openapi(struct call *call)
+{
+    const struct service *s = call->service;
+    http_add_header(call->exchange, "Cache-Control", "no-cache");
+    if (!routes_not_modified(call, s->openapi_tag))
+        http_answer(
+            call->exchange, 200, "application/json", http_static(s->openapi, strlen(s->openapi)));
+}
+
+void routes_techniques(struct call *call)
+{
+    routes_json(call, 200, pen_techniques_json(call->service->catalogue));
+}
+
+void routes_technique(struct call *call)
+{
+    const struct pen_technique_info *info =
+        pen_catalogue_find(call->service->catalogue, call->name);
+    struct pen_error error = {0};
+    if (info) {
+        routes_json(call, 200, pen_technique_json(info));
+        return;
+    }
+    pen_fail(&error, PEN_NOT_FOUND, "", "There is no method called \"%s\".", call->name);
+    routes_fail(call, &error, 0);
+}
+
+void routes_stats(struct call *call)
+{
+    http_add_header(call->exchange, "Cache-Control", "no-store");
+    routes_json(call, 200, metrics_stats_json(call->service->metrics));
+}
+
+static void write_device(struct pen_json *json, const struct worker_pool_numbers *pool)
+{
+    if (!pool->has_device) {
+        pen_json_null(json, "device");
+        return;
+    }
+    pen_json_object(json, "device");
+    pen_json_string(json, "renderer", pool->device.renderer);
+    pen_json_string(json, "version", pool->device.version);
+    pen_json_string(json, "platform", pool->device.platform);
+    pen_json_bool(json, "software", pool->device.software != 0);
+    pen_json_end(json);
+}
+
+static void write_limits(struct pen_json *json, const struct config *config)
+{
+    pen_json_object(json, "limits");
+    pen_json_uint(json, "image_side_px", PEN_MAX_IMAGE_SIDE);
+    pen_json_uint(json, "image_pixels", PEN_MAX_IMAGE_PIXELS);
+    pen_json_uint(json, "antialias", PEN_MAX_ANTIALIAS);
+    pen_json_uint(json, "lights", PEN_MAX_LIGHTS);
+    pen_json_uint(json, "json_bytes", PEN_MAX_JSON_BYTES);
+    pen_json_uint(json, "upload_bytes", config->upload_limit.bytes);
+    pen_json_uint(json, "queued_renders", config->queue_limit);
+    pen_json_uint(json, "renders_per_client", config->client_share);
+    pen_json_uint(json, "gpu_memory_bytes", config->gpu_memory.bytes);
+    pen_json_end(json);
+}
+
+void routes_info(struct call *call)
+{
+    struct service *s = call->service;
+    struct worker_pool_numbers pool;
+    struct scheduler_numbers queue;
+    struct pen_json json = {0};
+    worker_pool_read(s->pool, &pool);
+    scheduler_read(s->scheduler, &queue);
+    pen_json_object(&json, NULL);
+    pen_json_string(&json, "name", "penumbra");
+    pen_json_string(&json, "version", PENUMBRA_VERSION);
+    pen_json_string(&json, "build", picture_build());
+    pen_json_double(&json, "uptime_s", clock_ms(clock_now_ns() - s->started_ns) / 1e3);
+    write_device(&json, &pool);
+    pen_json_object(&json, "workers");
+    pen_json_uint(&json, "configured", s->config->workers);
+    pen_json_uint(&json, "up", pool.up);
+    pen_json_uint(&json, "restarts", pool.restarts);
+    pen_json_double(&json, "context_ms", pool.create_ms);
+    pen_json_double(&json, "warm_up_ms", pool.warm_ms);
+    if (pool.restarts)
+        pen_json_double(&json, "last_back_after_ms", pool.back_ms);
+    pen_json_end(&json);
+    pen_json_object(&json, "queue");
+    pen_json_uint(&json, "waiting", queue.queued);
+    pen_json_uint(&json, "rendering", queue.running);
+    pen_json_end(&json);
+    pen_json_uint(&json, "scenes", scene_store_count(s->store, STORE_SCENES));
+    pen_json_uint(&json, "images", scene_store_count(s->store, STORE_IMAGES));
+    pen_json_uint(&json, "gpu_bytes", pool.gpu_bytes);
+    write_limits(&json, s->config);
+    pen_json_object(&json, "links");
+    pen_json_string(&json, "openapi", "/openapi.json");
+    pen_json_string(&json, "docs", "/docs");
+    pen_json_string(&json, "techniques", "/v1/techniques");
+    pen_json_string(&json, "scenes", "/v1/scenes");
+    pen_json_string(&json, "images", "/v1/images");
+    pen_json_string(&json, "stats", "/v1/stats");
+    pen_json_end(&json);
+    pen_json_end(&json);
+    http_add_header(call->exchange, "Cache-Control", "no-store");
+    routes_json(call, 200, pen_json_finish(&json, NULL));
+}

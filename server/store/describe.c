@@ -1,0 +1,119 @@
+#include "server/store/describe.h"
+#include "protocol/json_result.h"
+#include "protocol/memory.h"
+#include "renderer/blob/pscene.h"
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <time.h>
+#include <unistd.h>
+
+#define MAX_META (4u << 20)
+
+/* Geometry and textures go to the GPU nearly as they lie in the blob. */
+static uint64_t gpu_bytes(const struct psc_header *header)
+{
+    static const enum psc_section_id resident[] = {
+        PSC_POSITIONS, PSC_ATTRIBUTES, PSC_INDICES, PSC_TEXELS};
+    uint64_t bytes = 0;
+    for (size_t i = 0; i < sizeof resident / sizeof *resident; i++)
+        bytes += header->sections[resident[i]].bytes;
+    return bytes;
+}
+
+static char *describe_scene(
+    const struct psc_scene *scene, const uint8_t id[PEN_ID_BYTES], uint64_t source_bytes)
+{
+    struct pen_scene_info info = {
+        .source_bytes = source_bytes,
+        .blob_bytes = scene->header->file_bytes,
+        .gpu_bytes = gpu_bytes(scene->header),
+        .stored_unix_s = time(NULL),
+        .vertices = scene->vertex_count,
+        .primitives = scene->primitive_count,
+        .instances = scene->instance_count,
+        .materials = scene->material_count,
+        .textures = scene->texture_count,
+        .images = scene->image_count,
+        .animations = scene->header->animations,
+        .triangles = scene->header->triangles,
+        .camera_count = scene->camera_count,
+        .light_count = scene->light_count,
+        .warnings = scene->warnings,
+        .warning_bytes = scene->warning_bytes,
+    };
+    memcpy(info.id, id, PEN_ID_BYTES);
+    memcpy(info.bounds_min, scene->header->bounds_min, sizeof info.bounds_min);
+    memcpy(info.bounds_max, scene->header->bounds_max, sizeof info.bounds_max);
+    struct pen_scene_camera *cameras = pen_alloc_zero(scene->camera_count + 1, sizeof *cameras);
+    struct pen_scene_light *lights = pen_alloc_zero(scene->light_count + 1, sizeof *lights);
+    for (uint32_t i = 0; i < scene->camera_count; i++) {
+        const struct psc_camera *from = &scene->cameras[i];
+        memcpy(cameras[i].eye, from->eye, sizeof from->eye);
+        memcpy(cameras[i].target, from->target, sizeof from->target);
+        memcpy(cameras[i].up, from->up, sizeof from->up);
+        cameras[i].fov_y_deg = from->fov_y_deg;
+        snprintf(cameras[i].name, sizeof cameras[i].name, "%.*s",
+            (int)strnlen(from->name, sizeof from->name), from->name);
+    }
+    for (uint32_t i = 0; i < scene->light_count; i++) {
+        const struct psc_light *from = &scene->lights[i];
+        lights[i].light = from->light;
+        snprintf(lights[i].name, sizeof lights[i].name, "%.*s",
+            (int)strnlen(from->name, sizeof from->name), from->name);
+    }
+    info.cameras = cameras;
+    info.lights = lights;
+    char *text = pen_scene_json(&info);
+    free(cameras);
+    free(lights);
+    return text;
+}
+
+char *describe_blob(enum store_kind kind, const uint8_t id[PEN_ID_BYTES], int blob_fd,
+    uint64_t source_bytes, struct pen_error *error)
+{
+    struct psc_scene scene;
+    char *text = NULL;
+    if (!psc_open(blob_fd, &scene, error))
+        return NULL;
+    if (memcmp(scene.header->source, id, PEN_ID_BYTES)) {
+        pen_fail(error, PEN_INTERNAL, "", "The importer mixed up two uploads.");
+    } else if (kind == STORE_SCENES) {
+        text = describe_scene(&scene, id, source_bytes);
+    } else if (scene.image_count != 1) {
+        pen_fail(error, PEN_INVALID, "", "The upload holds no image.");
+    } else {
+        struct pen_image_info info = {.source_bytes = source_bytes,
+            .blob_bytes = scene.header->file_bytes,
+            .stored_unix_s = time(NULL),
+            .width = scene.images[0].width,
+            .height = scene.images[0].height};
+        memcpy(info.id, id, PEN_ID_BYTES);
+        text = pen_image_json(&info);
+    }
+    psc_close(&scene);
+    return text;
+}
+
+char *describe_stored(struct scene_store *store, enum store_kind kind,
+    const uint8_t id[PEN_ID_BYTES], struct pen_error *error)
+{
+    struct stat status;
+    char *text = NULL;
+    int fd = scene_store_open_meta(store, kind, id, error);
+    if (fd < 0)
+        return NULL;
+    bool ok = !fstat(fd, &status) && status.st_size > 0 && status.st_size <= MAX_META &&
+              (text = malloc((size_t)status.st_size + 1)) &&
+              read(fd, text, (size_t)status.st_size) == (ssize_t)status.st_size;
+    close(fd);
+    if (ok) {
+        text[status.st_size] = 0;
+        return text;
+    }
+    free(text);
+    pen_fail(error, PEN_UNAVAILABLE, "", "The store could not be read.");
+    return NULL;
+}

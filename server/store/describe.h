@@ -1,0 +1,11 @@
+/* What the store tells about a scene or an image: read from its blob once, at import. */
+#pragma once
+#include "server/store/scene_store.h"
+
+/* The document (pen_scene_json or pen_image_json), malloc'd. Errors: PEN_INVALID for a blob
+ * that does not pass psc_open, or that is of another source. */
+char *describe_blob(enum store_kind kind, const uint8_t id[PEN_ID_BYTES], int blob_fd,
+    uint64_t source_bytes, struct pen_error *error);
+/* The stored document, malloc'd. Errors: PEN_NOT_FOUND, PEN_UNAVAILABLE. */
+char *describe_stored(struct scene_store *store, enum store_kind kind,
+    const uint8_t id[PEN_ID_BYTES], struct pen_error *error);

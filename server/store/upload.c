@@ -1,0 +1,232 @@
+#include "server/store/upload.h"
+#include "protocol/memory.h"
+#include "renderer/import/bundle.h"
+#include "server/base/hash.h"
+#include "server/store/multipart.h"
+#include <errno.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+#include <unistd.h>
+
+#define SPOOL "parts" /* the files of a multipart body, one behind the other */
+
+struct part {
+    char name[PEN_BUNDLE_MAX_NAME + 1];
+    uint64_t offset, bytes; /* in the spool */
+};
+
+struct upload {
+    struct scene_store *store;
+    struct store_staging staging;
+    int file; /* the source, or the spool */
+    uint64_t bytes, written, limit;
+    struct hash *hash;
+    struct multipart *multipart; /* NULL: a raw body */
+    struct part *parts;
+    uint32_t part_count;
+    size_t part_capacity;
+};
+
+static bool write_all(int fd, const void *data, size_t bytes, struct pen_error *error)
+{
+    const char *at = data;
+    while (bytes) {
+        ssize_t n = write(fd, at, bytes);
+        if (n < 0 && errno == EINTR)
+            continue;
+        if (n <= 0)
+            return pen_fail(error, PEN_UNAVAILABLE, "",
+                errno == ENOSPC || errno == EDQUOT ? "The store is full."
+                                                   : "The store could not be written.");
+        at += n;
+        bytes -= (size_t)n;
+    }
+    return true;
+}
+
+/* Relative, '/'-separated, without "", "." and ".." parts; a leading "./" is dropped. */
+static bool is_safe_name(const char *name)
+{
+    if (!*name || strlen(name) > PEN_BUNDLE_MAX_NAME || *name == '/' || strchr(name, '\\'))
+        return false;
+    for (const char *at = name; at;) {
+        size_t n = strcspn(at, "/");
+        if (n == 0 || (n == 1 && at[0] == '.') || (n == 2 && at[0] == '.' && at[1] == '.'))
+            return false;
+        for (size_t i = 0; i < n; i++)
+            if ((unsigned char)at[i] < 0x20 || at[i] == 0x7f)
+                return false;
+        at = at[n] ? at + n + 1 : NULL;
+    }
+    return true;
+}
+
+static bool begin_part(void *context, const char *name, struct pen_error *error)
+{
+    struct upload *u = context;
+    while (!strncmp(name, "./", 2))
+        name += 2;
+    if (!is_safe_name(name))
+        return pen_fail(error, PEN_INVALID, "", "A file of the upload has an invalid name.");
+    if (u->part_count == PEN_BUNDLE_MAX_ENTRIES)
+        return pen_fail(
+            error, PEN_TOO_BIG, "", "An upload has at most %d files.", PEN_BUNDLE_MAX_ENTRIES);
+    u->parts = pen_grow(u->parts, &u->part_capacity, u->part_count + 1, sizeof *u->parts);
+    struct part *part = &u->parts[u->part_count++];
+    snprintf(part->name, sizeof part->name, "%s", name);
+    part->offset = u->written;
+    part->bytes = 0;
+    return true;
+}
+
+static bool add_data(void *context, const void *data, size_t bytes, struct pen_error *error)
+{
+    struct upload *u = context;
+    u->parts[u->part_count - 1].bytes += bytes;
+    u->written += bytes;
+    return write_all(u->file, data, bytes, error);
+}
+
+struct upload *upload_create(
+    struct scene_store *store, const char *content_type, uint64_t limit, struct pen_error *error)
+{
+    struct upload *u = pen_alloc_zero(1, sizeof *u);
+    u->store = store;
+    u->limit = limit;
+    u->file = u->staging.folder = -1;
+    struct multipart_sink sink = {begin_part, add_data, u};
+    bool is_multipart = !strncasecmp(content_type, "multipart/form-data", 19);
+    if (is_multipart && !(u->multipart = multipart_create(content_type, &sink, error)))
+        goto fail;
+    if (!is_multipart)
+        u->hash = hash_create();
+    if (!scene_store_stage(store, &u->staging, error))
+        goto fail;
+    u->file = openat(u->staging.folder, is_multipart ? SPOOL : STORE_SOURCE,
+        O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
+    if (u->file < 0) {
+        pen_fail(error, PEN_UNAVAILABLE, "", "The store could not be written.");
+        goto fail;
+    }
+    return u;
+fail:
+    upload_destroy(u);
+    return NULL;
+}
+
+void upload_destroy(struct upload *u)
+{
+    if (!u)
+        return;
+    if (u->file >= 0)
+        close(u->file);
+    scene_store_discard(u->store, &u->staging);
+    hash_destroy(u->hash);
+    multipart_destroy(u->multipart);
+    free(u->parts);
+    free(u);
+}
+
+bool upload_add(struct upload *u, const void *data, size_t bytes, struct pen_error *error)
+{
+    u->bytes += bytes;
+    if (u->bytes > u->limit)
+        return pen_fail(error, PEN_TOO_BIG, "", "An upload has at most %llu bytes.",
+            (unsigned long long)u->limit);
+    if (u->multipart)
+        return multipart_add(u->multipart, data, bytes, error);
+    hash_add(u->hash, data, bytes);
+    return write_all(u->file, data, bytes, error);
+}
+
+static int by_name(const void *a, const void *b)
+{
+    return strcmp(((const struct part *)a)->name, ((const struct part *)b)->name);
+}
+
+static bool put(struct upload *u, int to, const void *data, size_t bytes, struct pen_error *error)
+{
+    hash_add(u->hash, data, bytes);
+    return write_all(to, data, bytes, error);
+}
+
+static bool put_part(struct upload *u, int to, const struct part *part, struct pen_error *error)
+{
+    char piece[1 << 16];
+    for (uint64_t done = 0; done < part->bytes;) {
+        uint64_t left = part->bytes - done;
+        ssize_t n = pread(u->file, piece, left < sizeof piece ? (size_t)left : sizeof piece,
+            (off_t)(part->offset + done));
+        if (n <= 0)
+            return pen_fail(error, PEN_UNAVAILABLE, "", "The store could not be read.");
+        if (!put(u, to, piece, (size_t)n, error))
+            return false;
+        done += (uint64_t)n;
+    }
+    return true;
+}
+
+static bool stands_alone(const char *name)
+{
+    const char *dot = strrchr(name, '.');
+    return dot &&
+           (!strcasecmp(dot, ".glb") || !strcasecmp(dot, ".zip") || !strcasecmp(dot, ".png") ||
+               !strcasecmp(dot, ".jpg") || !strcasecmp(dot, ".jpeg") || !strcasecmp(dot, ".webp"));
+}
+
+/* Spool to source: the bundle's header and entries, or the only file. */
+static bool write_bundle(struct upload *u, struct pen_error *error)
+{
+    if (!u->part_count)
+        return pen_fail(error, PEN_MALFORMED, "", "The upload holds no file.");
+    qsort(u->parts, u->part_count, sizeof *u->parts, by_name);
+    for (uint32_t i = 1; i < u->part_count; i++)
+        if (!strcmp(u->parts[i - 1].name, u->parts[i].name))
+            return pen_fail(error, PEN_INVALID, "", "Two files of the upload have the same name.");
+    int to = openat(u->staging.folder, STORE_SOURCE, O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
+    if (to < 0)
+        return pen_fail(error, PEN_UNAVAILABLE, "", "The store could not be written.");
+    u->hash = hash_create();
+    bool alone = u->part_count == 1 && stands_alone(u->parts[0].name);
+    uint32_t head[2] = {u->part_count, 0};
+    bool ok =
+        alone || (put(u, to, PEN_BUNDLE_MAGIC, 8, error) && put(u, to, head, sizeof head, error));
+    for (uint32_t i = 0; ok && i < u->part_count; i++) {
+        const struct part *part = &u->parts[i];
+        uint32_t name_bytes[2] = {(uint32_t)strlen(part->name), 0};
+        ok = alone || (put(u, to, name_bytes, sizeof name_bytes, error) &&
+                          put(u, to, &part->bytes, sizeof part->bytes, error) &&
+                          put(u, to, part->name, name_bytes[0], error));
+        ok = ok && put_part(u, to, part, error);
+    }
+    close(u->file);
+    u->file = to;
+    unlinkat(u->staging.folder, SPOOL, 0);
+    return ok;
+}
+
+bool upload_finish(struct upload *u, uint8_t id[PEN_ID_BYTES], struct pen_error *error)
+{
+    if (u->multipart && (!multipart_end(u->multipart, error) || !write_bundle(u, error)))
+        return false;
+    if (!u->bytes)
+        return pen_fail(error, PEN_MALFORMED, "", "The upload is empty.");
+    hash_finish(u->hash, id);
+    u->hash = NULL;
+    close(u->file);
+    u->file = -1;
+    return true;
+}
+
+struct store_staging *upload_staging(struct upload *u)
+{
+    return &u->staging;
+}
+
+uint64_t upload_bytes(const struct upload *u)
+{
+    return u->bytes;
+}

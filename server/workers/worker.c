@@ -1,0 +1,220 @@
+/* penumbra-worker: one GL context on the main thread, and encoder threads, so that frame N + 1
+ * renders while frame N is encoded. Talks to penumbrad on CHANNEL_WORKER_FD and ends with it. */
+#include "protocol/memory.h"
+#include "renderer/renderer.h"
+#include "server/workers/channel.h"
+#include "server/base/clock.h"
+#include "server/workers/worker_encoder.h"
+#include "server/workers/worker_measure.h"
+#include <errno.h>
+#include <fcntl.h>
+#include <poll.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#define IDLE_BEFORE_WARM_UP_MS 10000 /* a replacement has work to catch up with first */
+#define EXIT_REFUSED 2
+#define EXIT_LOST 3
+#define EXIT_PROTOCOL 4
+
+struct worker {
+    struct pen_renderer *renderer;
+    struct worker_encoder *encoder;
+    enum worker_warm_up warm_up;      /* what is still to be done */
+    struct channel_resident resident; /* as told last, most recently used first */
+};
+
+static void send_or_exit(const struct channel_message *message)
+{
+    if (!channel_send(CHANNEL_WORKER_FD, message, NULL))
+        _exit(EXIT_PROTOCOL); /* the daemon is gone */
+}
+
+static void warm_up(struct worker *worker)
+{
+    static struct channel_message message;
+    message.version = CHANNEL_VERSION;
+    message.kind = CHANNEL_WARM;
+    message.warm.warm_ms = (float)pen_renderer_warm_up(worker->renderer);
+    message.warm.gpu_bytes = pen_renderer_gpu_bytes(worker->renderer);
+    worker->warm_up = WORKER_NO_WARM_UP;
+    send_or_exit(&message);
+}
+
+/* Tells the daemon which scenes are in GPU memory when that has changed; `used` (or NULL) was used
+ * just now. */
+static void tell_resident(struct worker *worker, const uint8_t *used)
+{
+    static struct channel_message message;
+    struct channel_resident *now = &message.resident;
+    memset(now, 0, sizeof *now);
+    if (used && pen_renderer_has_scene(worker->renderer, used))
+        memcpy(now->scenes[now->count++], used, PEN_ID_BYTES);
+    for (uint32_t i = 0; i < worker->resident.count && now->count < CHANNEL_MAX_RESIDENT; i++) {
+        const uint8_t *scene = worker->resident.scenes[i];
+        bool first = used && !memcmp(scene, used, PEN_ID_BYTES);
+        if (!first && pen_renderer_has_scene(worker->renderer, scene))
+            memcpy(now->scenes[now->count++], scene, PEN_ID_BYTES);
+    }
+    if (!memcmp(now, &worker->resident, sizeof *now))
+        return;
+    worker->resident = *now;
+    message.version = CHANNEL_VERSION;
+    message.kind = CHANNEL_RESIDENT;
+    send_or_exit(&message);
+}
+
+/* Makes the scene and the emission images resident, all at once. */
+static bool load(struct worker *worker, const struct channel_job *job,
+    const struct channel_fds *fds, struct pen_error *error)
+{
+    struct pen_renderer *renderer = worker->renderer;
+    bool ok = pen_renderer_load_scene(renderer, job->request.scene, fds->fd[0], error);
+    for (uint32_t i = 0; ok && i < job->image_count; i++)
+        ok = pen_renderer_load_image(renderer, job->images[i], fds->fd[1 + i], error);
+    bool all = ok && pen_renderer_has_scene(renderer, job->request.scene);
+    for (uint32_t i = 0; all && i < job->image_count; i++)
+        all = pen_renderer_has_image(renderer, job->images[i]);
+    if (ok && !all)
+        pen_fail(error, PEN_TOO_BIG, "",
+            "The scene and its emission images do not fit into GPU memory together.");
+    return all;
+}
+
+/* False when the context is lost: the job stays unanswered and the daemon gives it to another. */
+static bool run_job(
+    struct worker *worker, const struct channel_message *message, const struct channel_fds *fds)
+{
+    const struct channel_job *job = &message->job_data;
+    struct channel_message note = {CHANNEL_VERSION, CHANNEL_STARTED, message->job};
+    send_or_exit(&note);
+    struct worker_item *item = pen_alloc_zero(1, sizeof *item);
+    struct pen_result *result = &item->message.result;
+    struct pen_error *error = &result->error;
+    item->message.version = CHANNEL_VERSION;
+    item->message.kind = CHANNEL_DONE;
+    item->message.job = message->job;
+    item->output = job->request.output;
+    item->measure = job->measure;
+    item->reference_fd = -1;
+    result->completed = job->request;
+    bool compares = channel_has_reference(job->measure);
+    bool ok = job->image_count <= PEN_MAX_LIGHTS && job->measure <= CHANNEL_NUMBERS &&
+              fds->count == 1 + job->image_count + compares;
+    if (!ok)
+        pen_fail(error, PEN_INTERNAL, "", "The worker was handed an incomplete job.");
+    ok = ok && pen_request_check(&job->request, pen_renderer_catalogue(), error);
+    bool was_resident = ok && pen_renderer_has_scene(worker->renderer, job->request.scene);
+    uint64_t start = clock_now_ns();
+    ok = ok && load(worker, job, fds, error);
+    double load_ms = clock_ms(clock_now_ns() - start);
+    struct pen_request request = job->request;
+    if (ok && job->measure != CHANNEL_PICTURE) {
+        worker_measure_output(&request.output);
+        pen_renderer_drop_shadows(worker->renderer);
+    }
+    if (ok && compares)
+        item->reference_fd = fcntl(fds->fd[1 + job->image_count], F_DUPFD_CLOEXEC, 3);
+    ok = ok && pen_renderer_render(worker->renderer, &request, &item->frame, result, error);
+    result->completed.output = job->request.output;
+    if (!ok && pen_renderer_is_lost(worker->renderer)) {
+        free(item);
+        return false;
+    }
+    if (!ok && error->code == PEN_OK)
+        pen_fail(error, PEN_INTERNAL, "", "The render failed without saying why.");
+    result->stage_ms[PEN_STAGE_LOAD] = (float)load_ms; /* after the render, which starts afresh */
+    result->scene_was_resident = was_resident;
+    result->device = *pen_renderer_device(worker->renderer);
+    result->gpu_bytes = pen_renderer_gpu_bytes(worker->renderer);
+    tell_resident(worker, job->request.scene); /* before the answer, so that both agree */
+    note.kind = CHANNEL_RENDERED;
+    send_or_exit(&note);
+    worker_encoder_submit(worker->encoder, item); /* failures too: answers keep their order */
+    return true;
+}
+
+static void drop(struct worker *worker, const uint8_t scene[PEN_ID_BYTES])
+{
+    pen_renderer_drop_scene(worker->renderer, scene);
+    tell_resident(worker, NULL);
+}
+
+/* Returns the exit status once the daemon hangs up or the context is lost. */
+static int serve(struct worker *worker)
+{
+    static struct channel_message message;
+    struct channel_fds fds;
+    for (;;) {
+        struct pollfd watch = {CHANNEL_WORKER_FD, POLLIN, 0};
+        int n =
+            poll(&watch, 1, worker->warm_up == WORKER_WARM_UP_IDLE ? IDLE_BEFORE_WARM_UP_MS : -1);
+        if (n == 0) {
+            warm_up(worker);
+            continue;
+        }
+        if (n < 0 && errno == EINTR)
+            continue;
+        int got = channel_receive(CHANNEL_WORKER_FD, &message, &fds);
+        if (got == 0 || (got < 0 && errno == ECONNRESET))
+            return 0;
+        if (got < 0)
+            return EXIT_PROTOCOL;
+        bool alive = true;
+        if (message.kind == CHANNEL_JOB)
+            alive = run_job(worker, &message, &fds);
+        else if (message.kind == CHANNEL_DROP)
+            drop(worker, message.drop.scene);
+        channel_close_fds(&fds);
+        if (!alive)
+            return EXIT_LOST;
+    }
+}
+
+int main(int argc, char **argv)
+{
+    struct pen_renderer_config config = {0};
+    struct worker worker = {0};
+    for (int i = 1; i + 1 < argc; i += 2) {
+        unsigned long long value = strtoull(argv[i + 1], NULL, 10);
+        if (!strcmp(argv[i], "--device"))
+            config.device = (uint32_t)value;
+        else if (!strcmp(argv[i], "--device-index"))
+            config.device_index = (uint32_t)value;
+        else if (!strcmp(argv[i], "--require-gpu"))
+            config.require_gpu = value != 0;
+        else if (!strcmp(argv[i], "--gl-debug"))
+            config.debug = value != 0;
+        else if (!strcmp(argv[i], "--gpu-memory"))
+            config.gpu_memory_bytes = value;
+        else if (!strcmp(argv[i], "--warm-up"))
+            worker.warm_up = (enum worker_warm_up)value;
+    }
+    static struct channel_message hello;
+    struct pen_error error = {0};
+    uint64_t start = clock_now_ns();
+    worker.renderer = pen_renderer_create(&config, &error);
+    hello.version = CHANNEL_VERSION;
+    if (!worker.renderer) {
+        hello.kind = CHANNEL_REFUSED;
+        hello.refused = error;
+        send_or_exit(&hello);
+        return EXIT_REFUSED;
+    }
+    worker.encoder = worker_encoder_create(CHANNEL_WORKER_FD);
+    hello.kind = CHANNEL_HELLO;
+    hello.hello.pid = (uint32_t)getpid();
+    hello.hello.create_ms = (float)clock_ms(clock_now_ns() - start);
+    hello.hello.device = *pen_renderer_device(worker.renderer);
+    send_or_exit(&hello);
+    if (worker.warm_up == WORKER_WARM_UP_FIRST)
+        warm_up(&worker);
+    int status = serve(&worker);
+    worker_encoder_destroy(worker.encoder);
+    if (status == EXIT_LOST)
+        _exit(EXIT_LOST); /* nothing of a lost context is worth tidying */
+    pen_renderer_destroy(worker.renderer);
+    return status;
+}

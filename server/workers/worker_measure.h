@@ -1,0 +1,16 @@
+/* Measuring on the worker, where the frames are: a reference's planes go out, and later pictures
+ * are compared with them. Runs on the encoder threads. */
+#pragma once
+#include "server/workers/worker_encoder.h"
+
+/* What must be rendered to measure: every layer, in float. */
+void worker_measure_output(struct pen_output *output);
+
+/* Fills the answer's descriptors as item->measure says, and result.comparison when there is a
+ * reference. Errors: PEN_INTERNAL, in the item's result. */
+bool worker_measure(struct worker_item *item, struct channel_fds *fds);
+
+/* Display values in [0, 1] of scene-linear RGB: exposure, tone curve, sRGB (IEC
+ * 61966-2-1), as renderer/shaders/frame/display.glsl. */
+void worker_measure_display(
+    const float radiance[3], float exposure_ev, uint32_t tone_map, float display[3]);

@@ -2,12 +2,22 @@
 #include <stdarg.h>
 #include <stdio.h>
 
+static const struct {
+    const char *name;
+    uint8_t blame; /* enum pen_blame */
+    bool anyones;  /* not only the front end's */
+} codes[PEN_CODES] = {
+#define PEN_CODE(code, word, blame) {word, PEN_BLAME_##blame, true},
+#define PEN_FRONT_CODE(code, word, blame) {word, PEN_BLAME_##blame, false},
+#include "protocol/codes.def"
+};
+
 bool pen_fail(struct pen_error *e, enum pen_code code, const char *pointer, const char *format, ...)
 {
     if (!e || e->code != PEN_OK)
         return false;
     e->code = code;
-    e->retryable = code == PEN_TOO_MANY || code == PEN_UNAVAILABLE || code == PEN_DEADLINE;
+    e->retry_after_s = 0;
     snprintf(e->pointer, sizeof e->pointer, "%s", pointer ? pointer : "");
     va_list args;
     va_start(args, format);
@@ -16,39 +26,21 @@ bool pen_fail(struct pen_error *e, enum pen_code code, const char *pointer, cons
     return false;
 }
 
-const char *pen_code_title(enum pen_code code)
+void pen_error_receive(struct pen_error *e)
 {
-    switch (code) {
-    case PEN_OK:
-        return "OK";
-    case PEN_MALFORMED:
-        return "Bad Request";
-    case PEN_UNAUTHORIZED:
-        return "Unauthorized";
-    case PEN_NOT_FOUND:
-        return "Not Found";
-    case PEN_METHOD_NOT_ALLOWED:
-        return "Method Not Allowed";
-    case PEN_NOT_ACCEPTABLE:
-        return "Not Acceptable";
-    case PEN_TIMEOUT:
-        return "Request Timeout";
-    case PEN_TOO_BIG:
-        return "Content Too Large";
-    case PEN_URI_TOO_LONG:
-        return "URI Too Long";
-    case PEN_UNKNOWN_TYPE:
-        return "Unsupported Media Type";
-    case PEN_INVALID:
-        return "Unprocessable Content";
-    case PEN_TOO_MANY:
-        return "Too Many Requests";
-    case PEN_INTERNAL:
-        return "Internal Server Error";
-    case PEN_UNAVAILABLE:
-        return "Service Unavailable";
-    case PEN_DEADLINE:
-        return "Gateway Timeout";
-    }
-    return "Error";
+    if (e->code >= PEN_CODES || !codes[e->code].anyones)
+        e->code = PEN_INTERNAL;
+    e->retry_after_s = 0;
+    e->pointer[sizeof e->pointer - 1] = 0;
+    e->message[sizeof e->message - 1] = 0;
+}
+
+const char *pen_code_name(uint32_t code)
+{
+    return code < PEN_CODES ? codes[code].name : "unknown";
+}
+
+enum pen_blame pen_code_blame(uint32_t code)
+{
+    return code < PEN_CODES ? (enum pen_blame)codes[code].blame : PEN_BLAME_MACHINE;
 }

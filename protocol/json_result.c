@@ -117,18 +117,19 @@ void pen_server_timing(const struct pen_result *result, double total_ms, char *t
     }
 }
 
-char *pen_problem_json(const struct pen_error *error, const char *request_id)
+char *pen_problem_json(const struct pen_error *error, uint32_t status, const char *title,
+    bool retryable, const char *request_id)
 {
     struct pen_json json = {0};
     pen_json_object(&json, NULL);
     /* The status says what kind of problem it is, which is what about:blank stands for. */
     pen_json_string(&json, "type", "about:blank");
-    pen_json_string(&json, "title", pen_code_title(error->code));
-    pen_json_uint(&json, "status", error->code);
+    pen_json_string(&json, "title", title);
+    pen_json_uint(&json, "status", status);
     pen_json_string(&json, "detail", error->message);
     if (error->pointer[0])
         pen_json_string(&json, "pointer", error->pointer);
-    pen_json_bool(&json, "retryable", error->retryable);
+    pen_json_bool(&json, "retryable", retryable);
     if (request_id)
         pen_json_string(&json, "request_id", request_id);
     pen_json_end(&json);

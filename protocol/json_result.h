@@ -39,8 +39,10 @@ void pen_result_write_times(struct pen_json *json, const struct pen_result *resu
  * with the NUL. */
 void pen_server_timing(const struct pen_result *result, double total_ms, char *text, size_t bytes);
 
-/* application/problem+json (RFC 9457). `request_id` may be NULL. */
-char *pen_problem_json(const struct pen_error *error, const char *request_id);
+/* application/problem+json (RFC 9457), for the status that the error is told with. `request_id` may
+ * be NULL. */
+char *pen_problem_json(const struct pen_error *error, uint32_t status, const char *title,
+    bool retryable, const char *request_id);
 
 void pen_technique_write(
     struct pen_json *json, const char *key, const struct pen_technique_info *info);

@@ -41,8 +41,7 @@ static bool run(struct service *service, const sigset_t *signals)
         }
         worker_pool_read(service->pool, &pool);
         if (!pool.has_device && pool.refused.code != PEN_OK) {
-            log_event(LOG_ERROR, "no device to render on: %.*s",
-                (int)sizeof pool.refused.message - 1, pool.refused.message);
+            log_event(LOG_ERROR, "no device to render on: %s", pool.refused.message);
             return false;
         }
     }

@@ -2,20 +2,16 @@
  *
  *   penumbra-import --mode scene|image --source-id <64 hex> [--memory-mb 2048] [--cpu-seconds 60]
  *
- * Inherited descriptors:
- *   PEN_IMPORT_SOURCE_FD   the uploaded bytes: a regular file or memfd, read-only
- *   PEN_IMPORT_OUTPUT_FD   where the .pscene goes: an empty file or memfd, read-write
- *   PEN_IMPORT_REPORT_FD   a pipe, on which it writes exactly one struct pen_error (PEN_OK: done)
- *                          before it exits 0
- * No report, or another exit status: it crashed, which is the upload's fault; 2: the arguments are
- * wrong, nothing was read. When memory or CPU time runs out it still reports PEN_TOO_BIG. Only a
- * report of PEN_OK makes what stands in the output worth reading. A report's pointer is a place in
- * the uploaded glTF document.
- *
- * It puts itself into its sandbox (sandbox.h: rlimits, no_new_privs, Landlock, seccomp) before it
- * reads the first byte; the memory limit counts on top of the mapped upload. The kind of source is
- * found from its magic: glTF binary, zip, bundle (bundle.h), glTF JSON with data URIs; in mode
- * image PNG, JPEG or WebP, which become a one-image blob. */
+ * Inherited descriptors: PEN_IMPORT_SOURCE_FD the uploaded bytes (regular file or memfd,
+ * read-only), PEN_IMPORT_OUTPUT_FD where the .pscene goes (empty file or memfd, read-write), and
+ * PEN_IMPORT_REPORT_FD a pipe on which it writes exactly one struct pen_error (code PEN_OK: done)
+ * before it exits 0. No report, or another exit status: it crashed, and the file is PEN_INVALID (2:
+ * the arguments are wrong, nothing was read). When memory or CPU time runs out it still reports
+ * PEN_TOO_BIG; only a report of PEN_OK makes what stands in the output worth reading. A report's
+ * pointer is a place in the uploaded glTF document. It puts itself into its sandbox (sandbox.h:
+ * rlimits, no_new_privs, Landlock, seccomp) before it reads the first byte; the memory limit counts
+ * on top of the mapped upload. The kind of source is found from its magic: glTF binary, zip, bundle
+ * (bundle.h), glTF JSON with data URIs; mode image: PNG, JPEG or WebP into a one-image blob. */
 #pragma once
 #define PEN_IMPORT_SOURCE_FD 3
 #define PEN_IMPORT_OUTPUT_FD 4

@@ -91,7 +91,7 @@ static void serve(struct call *call, const struct auto_table *measured)
     memcpy(&wish, request->technique_params, sizeof wish);
     if (!auto_choose(table, &wish, (uint64_t)request->width * request->height, &pick)) {
         pen_fail(&error, PEN_INTERNAL, "/technique", "No method could be measured on this scene.");
-        routes_fail(call, &error, 0);
+        routes_fail(call, &error);
         return;
     }
     auto_apply(auto_find(pick.row->key), call->service->catalogue, &call->request);
@@ -277,7 +277,7 @@ static void expire_calls(struct run *run)
     while (late) {
         struct call *call = late;
         late = call->next_waiting;
-        routes_fail(call, &error, 0);
+        routes_fail(call, &error);
     }
 }
 
@@ -311,8 +311,7 @@ static void save(struct run *run)
 }
 
 /* Any thread. */
-static void done(
-    void *owner, struct compare *compare, const struct pen_error *error, uint32_t retry_after_s)
+static void done(void *owner, struct compare *compare, const struct pen_error *error)
 {
     struct run *run = owner;
     struct service *s = run->service;
@@ -336,7 +335,7 @@ static void done(
         if (error->code == PEN_OK)
             serve(call, &run->table);
         else
-            routes_fail(call, error, retry_after_s);
+            routes_fail(call, error);
     }
     free(run);
 }
@@ -351,10 +350,9 @@ static void start(struct run *run)
         .done = done,
         .owner = run};
     struct pen_error error = {0};
-    uint32_t retry_after_s = 0;
-    if (compare_start(run->service->scheduler, &plan, &retry_after_s, &error))
+    if (compare_start(run->service->scheduler, &plan, &error))
         return;
-    done(run, NULL, &error, retry_after_s);
+    done(run, NULL, &error);
 }
 
 /* Waits for a run that measures this view, or starts one. `wanted`: setup and cost. */
@@ -380,7 +378,8 @@ static void wait_for_run(
         pthread_mutex_unlock(&runs->lock);
         free(fresh);
         pen_fail(&error, PEN_UNAVAILABLE, "", "%d scenes are being measured already.", MAX_RUNS);
-        routes_fail(call, &error, 2);
+        error.retry_after_s = 2;
+        routes_fail(call, &error);
         return;
     }
     if (!run) {
@@ -411,7 +410,7 @@ void routes_auto(struct call *call)
     struct pen_error error = {0};
     if (!service_device(s, &device)) {
         pen_fail(&error, PEN_UNAVAILABLE, "", "The worker is still starting.");
-        routes_fail(call, &error, 1);
+        routes_fail(call, &error);
         return;
     }
     memcpy(&wish, call->request.technique_params, sizeof wish);

@@ -91,7 +91,8 @@ void log_write_request(const struct log_request *r)
         if (r->aborted)
             n += snprintf(line + n, sizeof line - (size_t)n, " aborted");
         if (r->error)
-            n += snprintf(line + n, sizeof line - (size_t)n, " \"%.200s\"", r->error);
+            n += snprintf(line + n, sizeof line - (size_t)n, " %s: \"%.200s\"",
+                pen_code_name(r->code), r->error);
         if (n > (int)sizeof line - 2)
             n = sizeof line - 2;
         line[n++] = '\n';
@@ -117,8 +118,10 @@ void log_write_request(const struct log_request *r)
         pen_json_double(&json, "queue_ms", r->queue_ms);
         pen_json_double(&json, "render_ms", r->render_ms);
     }
-    if (r->error)
+    if (r->error) {
+        pen_json_string(&json, "code", pen_code_name(r->code));
         pen_json_string(&json, "error", r->error);
+    }
     if (r->aborted)
         pen_json_bool(&json, "aborted", true);
     put_json(&json);

@@ -17,6 +17,7 @@ struct log_request {
     const char *technique; /* renders only, else NULL */
     double queue_ms, render_ms;
     bool cached;
+    enum pen_code code;
     const char *error; /* message to the client, or NULL */
     bool aborted;      /* the client did not get all of it */
 };

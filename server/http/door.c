@@ -1,5 +1,6 @@
 #include "server/http/door.h"
 #include "protocol/memory.h"
+#include "server/http/status.h"
 #include "server/base/clock.h"
 #include "server/base/log.h"
 #include <arpa/inet.h>
@@ -72,8 +73,8 @@ static struct in6_addr address_of(const struct sockaddr_storage *from)
     return address;
 }
 
-/* Under the lock. False when the table is full for this door's limits. */
-static const char *admit(struct door *door, int fd, const struct sockaddr_storage *from)
+/* Under the lock. Anything but PEN_OK: the table is full for this door's limits. */
+static enum pen_code admit(struct door *door, int fd, const struct sockaddr_storage *from)
 {
     struct in6_addr address = address_of(from);
     uint32_t same = 0;
@@ -81,9 +82,9 @@ static const char *admit(struct door *door, int fd, const struct sockaddr_storag
         same +=
             door->entries[i].used && !memcmp(&door->entries[i].address, &address, sizeof address);
     if (door->numbers.open >= door->config.connections)
-        return "503 Service Unavailable";
+        return PEN_UNAVAILABLE;
     if (same >= door->config.connections_per_address)
-        return "429 Too Many Requests";
+        return PEN_TOO_MANY;
     if (fd >= door->capacity) {
         int capacity = fd * 2 + 64;
         door->entries = pen_realloc_array(door->entries, (size_t)capacity, sizeof *door->entries);
@@ -96,21 +97,22 @@ static const char *admit(struct door *door, int fd, const struct sockaddr_storag
         .used = true, .state = DOOR_WAITING, .since_ns = clock_now_ns(), .address = address};
     door->numbers.open++;
     door->numbers.accepted++;
-    return NULL;
+    return PEN_OK;
 }
 
 /* A short answer written past the HTTP library; what does not fit the socket's buffer is lost. */
-static void write_refusal(int fd, const char *status, const char *detail)
+static void write_refusal(int fd, enum pen_code code, const char *detail)
 {
-    char body[256], text[640];
-    int n = snprintf(body, sizeof body,
-        "{\"type\":\"about:blank\",\"title\":\"%s\",\"status\":%.3s,\"detail\":\"%s\","
-        "\"retryable\":true}",
-        status + 4, status, detail);
+    struct http_status told = http_status_of(code);
+    struct pen_error error = {0};
+    char text[640];
+    pen_fail(&error, code, "", "%s", detail);
+    char *body = http_problem(&error, NULL);
     int size = snprintf(text, sizeof text,
-        "HTTP/1.1 %s\r\nContent-Type: application/problem+json\r\nContent-Length: %d\r\n"
+        "HTTP/1.1 %u %s\r\nContent-Type: application/problem+json\r\nContent-Length: %zu\r\n"
         "Retry-After: 1\r\nConnection: close\r\n\r\n%s",
-        status, n, body);
+        told.status, told.title, strlen(body), body);
+    free(body);
     if (send(fd, text, (size_t)size, MSG_DONTWAIT | MSG_NOSIGNAL) < 0)
         return;
 }
@@ -143,8 +145,8 @@ static void accept_all(struct door *door)
         int one = 1;
         setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &one, sizeof one);
         pthread_mutex_lock(&door->lock);
-        const char *refusal = admit(door, fd, &from);
-        if (refusal) {
+        enum pen_code refusal = admit(door, fd, &from);
+        if (refusal != PEN_OK) {
             door->numbers.refused++;
             if (door->config.plain)
                 write_refusal(fd, refusal, "There are too many connections.");
@@ -152,7 +154,7 @@ static void accept_all(struct door *door)
             add_lingerer(door, fd);
         }
         pthread_mutex_unlock(&door->lock);
-        if (!refusal)
+        if (refusal == PEN_OK)
             door->config.on_socket(door->config.context, fd, (struct sockaddr *)&from, bytes);
     }
 }
@@ -187,7 +189,7 @@ static void reap(struct door *door)
         bool asked = entry->state == DOOR_HEADER || entry->state == DOOR_BODY ||
                      (entry->state == DOOR_WAITING && !entry->served);
         if (asked && door->config.plain)
-            write_refusal(fd, "408 Request Timeout", "The request came too slowly.");
+            write_refusal(fd, PEN_TIMEOUT, "The request came too slowly.");
         door->numbers.too_slow += asked || entry->state == DOOR_SENDING;
         entry->shut = true;
         shutdown(fd, SHUT_RDWR);

@@ -1,6 +1,7 @@
 #include "server/http/http.h"
 #include "protocol/memory.h"
 #include "server/base/clock.h"
+#include "server/http/status.h"
 #include <arpa/inet.h>
 #include <ctype.h>
 #include <errno.h>
@@ -229,7 +230,7 @@ static enum MHD_Result break_off(struct http_exchange *x)
         char head[4096];
         int n = snprintf(head, sizeof head,
             "HTTP/1.1 %u %s\r\nConnection: close\r\nContent-Length: %zu\r\n", x->status,
-            pen_code_title(x->status), x->body.size);
+            http_status_title(x->status), x->body.size);
         for (uint32_t i = 0; i < x->header_count && n < (int)sizeof head - 700; i++)
             n += snprintf(head + n, sizeof head - (size_t)n, "%s: %s\r\n", x->headers[i].name,
                 x->headers[i].value);

@@ -22,7 +22,7 @@ static bool is_gone(struct waiter *waiter)
     return c->plan.is_gone && c->plan.is_gone(c->plan.owner);
 }
 
-static bool submit(struct compare *c, uint32_t *retry_after_s, struct pen_error *error)
+static bool submit(struct compare *c, struct pen_error *error)
 {
     const struct pen_request *request = &c->plan.requests[c->at];
     uint8_t key[PEN_ID_BYTES];
@@ -34,7 +34,7 @@ static bool submit(struct compare *c, uint32_t *retry_after_s, struct pen_error 
                         : c->at          ? CHANNEL_COMPARED
                                          : CHANNEL_REFERENCE;
     c->waiter.reference_fd = channel_has_reference(c->waiter.measure) ? c->planes_fd : 0;
-    return scheduler_submit(c->scheduler, request, key, false, &c->waiter, retry_after_s, error);
+    return scheduler_submit(c->scheduler, request, key, false, &c->waiter, error);
 }
 
 /* A method's own failure is its row's; anything else ends the run. */
@@ -65,7 +65,6 @@ static void finish(struct waiter *waiter, const struct outcome *outcome)
 {
     struct compare *c = (struct compare *)waiter;
     struct pen_error error = outcome->error;
-    uint32_t retry_after_s = outcome->retry_after_s;
     take(c, outcome);
     bool over = ends_all(c, &error);
     if (!over) {
@@ -73,14 +72,14 @@ static void finish(struct waiter *waiter, const struct outcome *outcome)
         do
             c->at++;
         while (c->at < c->plan.count && c->plan.wants && !c->plan.wants(c->plan.owner, c, c->at));
-        over = c->at == c->plan.count || !submit(c, &retry_after_s, &error);
+        over = c->at == c->plan.count || !submit(c, &error);
     }
     if (over) /* else the next one may have ended everything by now: c is not ours any more */
-        c->plan.done(c->plan.owner, c, &error, retry_after_s);
+        c->plan.done(c->plan.owner, c, &error);
 }
 
-bool compare_start(struct scheduler *scheduler, const struct compare_plan *plan,
-    uint32_t *retry_after_s, struct pen_error *error)
+bool compare_start(
+    struct scheduler *scheduler, const struct compare_plan *plan, struct pen_error *error)
 {
     struct compare *c = pen_alloc_zero(1, sizeof *c);
     struct compare_row *rows = pen_alloc_zero(plan->count, sizeof *rows);
@@ -89,7 +88,7 @@ bool compare_start(struct scheduler *scheduler, const struct compare_plan *plan,
     c->rows = rows;
     c->waiter.is_gone = is_gone;
     c->waiter.finish = finish;
-    if (submit(c, retry_after_s, error))
+    if (submit(c, error))
         return true;
     compare_destroy(c);
     return false;

@@ -16,10 +16,9 @@ struct compare_plan {
     /* Called before every request but the first; false leaves it out. May be NULL. */
     bool (*wants)(void *owner, struct compare *compare, uint32_t request);
     bool (*is_gone)(void *owner); /* the client has hung up; may be NULL */
-    /* Called once, from any thread. PEN_OK: the measurements are there.
-     * Ends with compare_destroy. */
-    void (*done)(void *owner, struct compare *compare, const struct pen_error *error,
-        uint32_t retry_after_s);
+    /* Called once, from any thread. PEN_OK: the measurements are there. Ends with
+     * compare_destroy. */
+    void (*done)(void *owner, struct compare *compare, const struct pen_error *error);
     void *owner;
 };
 
@@ -32,8 +31,8 @@ struct compare_row {
 /* One measurement after the other, so that none disturbs the times of another. They go through the
  * queue like any render: others are served in between, and a worker that dies is replaced. False,
  * with the error, when the first one is not accepted; `done` is then not called. */
-bool compare_start(struct scheduler *scheduler, const struct compare_plan *plan,
-    uint32_t *retry_after_s, struct pen_error *error);
+bool compare_start(
+    struct scheduler *scheduler, const struct compare_plan *plan, struct pen_error *error);
 /* One row per request of the plan. */
 const struct compare_row *compare_rows(const struct compare *compare);
 /* How many requests were through when it ended. */

@@ -159,15 +159,13 @@ static void attach(struct scheduler *s, struct render *render, struct waiter *wa
 }
 
 bool scheduler_submit(struct scheduler *s, const struct pen_request *request,
-    const uint8_t key[PEN_ID_BYTES], bool shareable, struct waiter *waiter, uint32_t *retry_after_s,
-    struct pen_error *error)
+    const uint8_t key[PEN_ID_BYTES], bool shareable, struct waiter *waiter, struct pen_error *error)
 {
     bool batch = request->delivery.priority == PEN_PRIORITY_BATCH;
     struct render *fresh = pen_alloc_zero(1, sizeof *fresh);
     pthread_mutex_lock(&s->lock);
     struct share *share = find_share(s, waiter->client);
     struct render *render = shareable ? find_key(s, key) : NULL;
-    *retry_after_s = retry_after(s);
     if (s->numbers.draining) {
         pen_fail(error, PEN_UNAVAILABLE, "", "The service is shutting down.");
     } else if (waiter->client && s->limits.client_share && share &&
@@ -206,6 +204,8 @@ bool scheduler_submit(struct scheduler *s, const struct pen_request *request,
         render = NULL;
         error = NULL;
     }
+    if (error)
+        error->retry_after_s = retry_after(s);
     pthread_mutex_unlock(&s->lock);
     free(fresh);
     if (!error)
@@ -315,7 +315,8 @@ void scheduler_finish(struct scheduler *s, struct render *render, const struct o
     double ms = clock_ms(clock_now_ns() - render->taken_ns);
     if (answer.error.code == PEN_OK)
         s->mean_ms += 0.1 * (ms - s->mean_ms);
-    answer.retry_after_s = retry_after(s);
+    if (answer.error.code != PEN_OK)
+        answer.error.retry_after_s = retry_after(s);
     pthread_mutex_unlock(&s->lock);
     answer.run_ms = ms;
     answer.queue_ms = clock_ms(render->taken_ns - render->queued_ns);
@@ -376,7 +377,7 @@ static uint64_t end_overdue(struct scheduler *s, uint64_t now, struct outcome *o
         prune(s);
     for (struct waiter *w = overdue; w && now != UINT64_MAX; w = w->next)
         s->numbers.expired++;
-    outcome->retry_after_s = retry_after(s);
+    outcome->error.retry_after_s = retry_after(s);
     pthread_mutex_unlock(&s->lock);
     answer_all(overdue, outcome);
     return next;

@@ -9,7 +9,6 @@ struct outcome {
     struct pen_error error;  /* PEN_OK: there is a picture */
     struct picture *picture; /* borrowed for the call */
     double queue_ms, run_ms; /* before and after a worker took it */
-    uint32_t retry_after_s;  /* with 429 and 503 */
     bool shared;             /* another client's request rendered it */
     /* Of measurements, borrowed like the picture: */
     const struct pen_result *result; /* also when nothing was encoded */
@@ -53,10 +52,10 @@ struct scheduler *scheduler_create(
 void scheduler_destroy(struct scheduler *scheduler); /* nothing may be queued or running */
 
 /* Queues a request, or joins one that is queued or running when `shareable`. Errors, with the
- * waiter untouched: PEN_TOO_MANY (share used up), PEN_UNAVAILABLE (full or draining), and then
- * *retry_after_s. A success uses one unit of the client's share until scheduler_release. */
+ * waiter untouched: PEN_TOO_MANY (share used up), PEN_UNAVAILABLE (full or draining), both with
+ * retry_after_s. A success uses one unit of the client's share until scheduler_release. */
 bool scheduler_submit(struct scheduler *scheduler, const struct pen_request *request,
-    const uint8_t key[PEN_ID_BYTES], bool shareable, struct waiter *waiter, uint32_t *retry_after_s,
+    const uint8_t key[PEN_ID_BYTES], bool shareable, struct waiter *waiter,
     struct pen_error *error);
 void scheduler_release(struct scheduler *scheduler, uint64_t client);
 

@@ -2,6 +2,7 @@
 #include "protocol/memory.h"
 #include "server/base/clock.h"
 #include "server/base/log.h"
+#include "server/http/status.h"
 #include "server/routes/routes.h"
 #include <stdio.h>
 #include <stdlib.h>
@@ -60,8 +61,9 @@ static void readyz(struct http_exchange *x, struct service *s)
     struct pen_request request;
     struct pen_error error = {0};
     uint8_t key[PEN_ID_BYTES];
-    uint32_t retry_after_s;
-    struct probe *probe = pen_alloc_zero(1, sizeof *probe);
+    struct probe *probe = calloc(1, sizeof *probe);
+    if (!probe)
+        abort();
     x->user = probe;
     probe->exchange = x;
     probe->service = s;
@@ -72,8 +74,7 @@ static void readyz(struct http_exchange *x, struct service *s)
     request.width = request.height = CANARY_SIDE;
     picture_key(&request, key);
     http_defer(x);
-    if (!scheduler_submit(
-            s->scheduler, &request, key, true, &probe->waiter, &retry_after_s, &error))
+    if (!scheduler_submit(s->scheduler, &request, key, true, &probe->waiter, &error))
         answer_text(x, 503, "The queue is full.\n");
 }
 
@@ -187,7 +188,7 @@ static void begin(struct http_exchange *x, const struct pen_error *framing)
 {
     bool get = !strcmp(x->method, "GET") || !strcmp(x->method, "HEAD");
     if (framing->code != PEN_OK) {
-        answer_text(x, framing->code, "The request is malformed.\n");
+        answer_text(x, http_status_of(framing->code).status, "The request is malformed.\n");
     } else if (!get) {
         http_add_header(x, "Allow", "GET, HEAD");
         answer_text(x, 405, "This listener takes GET and HEAD.\n");

@@ -46,8 +46,7 @@ static void answer(struct call *call, struct compare *compare)
 }
 
 /* Any thread. */
-static void done(
-    void *owner, struct compare *compare, const struct pen_error *error, uint32_t retry_after_s)
+static void done(void *owner, struct compare *compare, const struct pen_error *error)
 {
     struct call *call = owner;
     if (error->code == PEN_DEADLINE) {
@@ -57,9 +56,9 @@ static void done(
             "compare "
             "fewer methods or smaller images.",
             compare_done_count(compare), 1 + call->compare->count);
-        routes_fail(call, &late, retry_after_s);
+        routes_fail(call, &late);
     } else if (error->code != PEN_OK)
-        routes_fail(call, error, retry_after_s);
+        routes_fail(call, error);
     else
         answer(call, compare);
     compare_destroy(compare);
@@ -85,17 +84,16 @@ void routes_compare(struct call *call)
 {
     struct service *s = call->service;
     struct pen_error error = {0};
-    uint32_t retry_after_s = 0;
     if (!read_body(call, &error)) {
-        routes_fail(call, &error, 0);
+        routes_fail(call, &error);
         return;
     }
     struct pen_compare *compare = call->compare;
     for (uint32_t i = 0; i <= compare->count; i++)
         memcpy(compare->requests[i].scene, call->id, PEN_ID_BYTES);
     call->request = compare->requests[0];
-    if (!routes_check_store(call, &retry_after_s, &error)) {
-        routes_fail(call, &error, retry_after_s);
+    if (!routes_check_store(call, &error)) {
+        routes_fail(call, &error);
         return;
     }
     struct compare_plan plan = {.requests = compare->requests,
@@ -107,8 +105,8 @@ void routes_compare(struct call *call)
         .owner = call};
     call->holds_share = true; /* before another thread can complete the call */
     http_defer(call->exchange);
-    if (!compare_start(s->scheduler, &plan, &retry_after_s, &error)) {
+    if (!compare_start(s->scheduler, &plan, &error)) {
         call->holds_share = false;
-        routes_fail(call, &error, retry_after_s);
+        routes_fail(call, &error);
     }
 }

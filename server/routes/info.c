@@ -49,7 +49,7 @@ void routes_technique(struct call *call)
         return;
     }
     pen_fail(&error, PEN_NOT_FOUND, "", "There is no method called \"%s\".", call->name);
-    routes_fail(call, &error, 0);
+    routes_fail(call, &error);
 }
 
 void routes_stats(struct call *call)

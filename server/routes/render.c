@@ -82,7 +82,7 @@ static void finish(struct waiter *waiter, const struct outcome *outcome)
     if (*call->choice && outcome->error.code == PEN_OK)
         auto_runs_observe(call->service->auto_runs, call, outcome->run_ms);
     if (outcome->error.code != PEN_OK)
-        routes_fail(call, &outcome->error, outcome->retry_after_s);
+        routes_fail(call, &outcome->error);
     else
         answer_picture(call, outcome->picture);
 }
@@ -127,7 +127,7 @@ static bool negotiate(struct call *call, struct pen_error *error)
         "The image is %s, which Accept does not allow.", pen_format_mime[output->format]);
 }
 
-bool routes_check_store(struct call *call, uint32_t *retry_after_s, struct pen_error *error)
+bool routes_check_store(struct call *call, struct pen_error *error)
 {
     struct service *s = call->service;
     struct store_entry entry;
@@ -143,11 +143,11 @@ bool routes_check_store(struct call *call, uint32_t *retry_after_s, struct pen_e
             !scene_store_find(s->store, STORE_IMAGES, light->image, NULL))
             return pen_fail(error, PEN_INVALID, pointer, "There is no such image.");
     }
-    *retry_after_s = worker_pool_quarantine_s(s->pool, call->id);
-    if (*retry_after_s)
+    uint32_t refused_s = worker_pool_quarantine_s(s->pool, call->id);
+    if (refused_s)
         return pen_fail(error, PEN_INVALID, "",
             "Rendering this scene ended the renderer twice: it is refused for %u more seconds.",
-            *retry_after_s);
+            refused_s);
     return true;
 }
 
@@ -161,14 +161,13 @@ static bool wants_fresh(const struct call *call)
 void routes_render(struct call *call)
 {
     struct pen_error error = {0};
-    uint32_t retry_after_s = 0;
     if (!read_request(call, &error) || !negotiate(call, &error)) {
-        routes_fail(call, &error, 0);
+        routes_fail(call, &error);
         return;
     }
     memcpy(call->request.scene, call->id, PEN_ID_BYTES);
-    if (!routes_check_store(call, &retry_after_s, &error)) {
-        routes_fail(call, &error, retry_after_s);
+    if (!routes_check_store(call, &error)) {
+        routes_fail(call, &error);
         return;
     }
     if (!strcmp(call->request.technique, AUTO_NAME))
@@ -181,7 +180,6 @@ void routes_serve(struct call *call)
 {
     struct service *s = call->service;
     struct pen_error error = {0};
-    uint32_t retry_after_s = 0;
     struct pen_device_info device;
     call->technique = pen_catalogue_find(s->catalogue, call->request.technique)->name;
     bool fresh = wants_fresh(call);
@@ -212,10 +210,9 @@ void routes_serve(struct call *call)
     call->holds_share = true; /* before another thread can complete the call */
     if (!call->is_deferred)
         http_defer(call->exchange);
-    if (!scheduler_submit(
-            s->scheduler, &call->request, key, !fresh, &call->waiter, &retry_after_s, &error)) {
+    if (!scheduler_submit(s->scheduler, &call->request, key, !fresh, &call->waiter, &error)) {
         call->holds_share = false;
-        routes_fail(call, &error, retry_after_s);
+        routes_fail(call, &error);
     }
 }
 
@@ -227,7 +224,7 @@ void routes_result(struct call *call)
     if (!picture) {
         struct pen_error error = {0};
         pen_fail(&error, PEN_NOT_FOUND, "", "The result is not kept any more: render it again.");
-        routes_fail(call, &error, 0);
+        routes_fail(call, &error);
         return;
     }
     call->is_cached = true;

@@ -1,10 +1,10 @@
 #include "server/routes/routes.h"
+#include "protocol/memory.h"
 #include "protocol/fnv.h"
 #include "protocol/json_request.h"
-#include "protocol/json_result.h"
-#include "protocol/memory.h"
 #include "server/base/clock.h"
 #include "server/base/log.h"
+#include "server/http/status.h"
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -64,17 +64,19 @@ static void add_common(struct call *call)
     }
 }
 
-void routes_fail(struct call *call, const struct pen_error *error, uint32_t retry_after_s)
+void routes_fail(struct call *call, const struct pen_error *error)
 {
     struct http_exchange *x = call->exchange;
+    struct http_status told = http_status_of(error->code);
+    call->code = (enum pen_code)error->code;
     snprintf(call->error, sizeof call->error, "%.*s", (int)sizeof call->error - 1, error->message);
     if (error->code == PEN_UNAVAILABLE || error->code == PEN_TOO_MANY)
-        http_add_header(x, "Retry-After", "%u", retry_after_s ? retry_after_s : 1);
+        http_add_header(x, "Retry-After", "%u", error->retry_after_s ? error->retry_after_s : 1);
     if (error->code == PEN_UNAUTHORIZED)
         http_add_header(x, "WWW-Authenticate", "Bearer");
     http_add_header(x, "Cache-Control", "no-store");
-    http_answer(x, error->code, "application/problem+json",
-        http_text(pen_problem_json(error, x->request_id)));
+    http_answer(
+        x, told.status, "application/problem+json", http_text(http_problem(error, x->request_id)));
 }
 
 void routes_json(struct call *call, uint32_t status, char *text)
@@ -258,7 +260,7 @@ static void begin(struct http_exchange *x, const struct pen_error *framing)
     if (error.code != PEN_OK || !find_route(call, &error) || x->answered ||
         !authorise(call, &error) || !check_body(call, &error)) {
         if (!x->answered)
-            routes_fail(call, &error, 0);
+            routes_fail(call, &error);
         return;
     }
     uint8_t takes =
@@ -276,13 +278,13 @@ static void body(struct http_exchange *x, const void *data, size_t bytes)
     __atomic_add_fetch(&call->service->bytes_received, bytes, __ATOMIC_RELAXED);
     if (call->upload) {
         if (!upload_add(call->upload, data, bytes, &error))
-            routes_fail(call, &error, 0);
+            routes_fail(call, &error);
         return;
     }
     if (call->text_bytes + bytes > PEN_MAX_JSON_BYTES) {
         pen_fail(
             &error, PEN_TOO_BIG, "", "A render request has at most %d bytes.", PEN_MAX_JSON_BYTES);
-        routes_fail(call, &error, 0);
+        routes_fail(call, &error);
         return;
     }
     call->text = pen_grow(call->text, &call->text_capacity, call->text_bytes + bytes, 1);
@@ -321,6 +323,7 @@ static void completed(struct http_exchange *x)
         .queue_ms = call->queue_ms,
         .render_ms = call->render_ms,
         .cached = call->is_cached,
+        .code = call->code,
         .error = *call->error ? call->error : NULL,
         .aborted = x->aborted};
     log_write_request(&line);

@@ -37,6 +37,7 @@ struct call {
     /* For the log: */
     const char *technique;
     double queue_ms, render_ms;
+    enum pen_code code; /* PEN_OK: nothing went wrong */
     char error[128];
 };
 
@@ -63,10 +64,10 @@ void routes_auto(struct call *call);
 void routes_serve(struct call *call);
 
 /* Everything the call's request refers to must be in the store. */
-bool routes_check_store(struct call *call, uint32_t *retry_after_s, struct pen_error *error);
+bool routes_check_store(struct call *call, struct pen_error *error);
 
 /* Answers. */
-void routes_fail(struct call *call, const struct pen_error *error, uint32_t retry_after_s);
+void routes_fail(struct call *call, const struct pen_error *error);
 void routes_json(struct call *call, uint32_t status, char *text); /* takes the text */
 /* Answers 304 when If-None-Match names the tag; true when it has. Adds the ETag either way. */
 bool routes_not_modified(struct call *call, const char *tag);

@@ -11,6 +11,7 @@
 
 #define DEFAULT_PAGE 50
 #define MAX_PAGE 200
+#define BUSY_S 2 /* until another upload may find room */
 
 static enum store_kind kind_of(const struct call *call)
 {
@@ -69,7 +70,8 @@ bool routes_begin_upload(struct call *call)
     }
     if (error.code == PEN_OK)
         return true;
-    routes_fail(call, &error, 2);
+    error.retry_after_s = BUSY_S;
+    routes_fail(call, &error);
     return false;
 }
 
@@ -94,7 +96,8 @@ static void finish(struct import_task *task)
     if (task->error.code == PEN_OK)
         text = describe(call, task->id, &task->error);
     if (!text) {
-        routes_fail(call, &task->error, 2);
+        task->error.retry_after_s = BUSY_S;
+        routes_fail(call, &task->error);
         return;
     }
     pen_id_to_hex(task->id, hex);
@@ -115,7 +118,8 @@ void routes_import(struct call *call)
     http_defer(call->exchange);
     if (!importer_submit(call->service->importer, task, &error)) {
         call->upload = task->upload;
-        routes_fail(call, &error, 2);
+        error.retry_after_s = BUSY_S;
+        routes_fail(call, &error);
     }
 }
 
@@ -155,7 +159,7 @@ void routes_list(struct call *call)
     uint8_t after[PEN_ID_BYTES];
     bool has_after = false;
     if (!read_page(call, &limit, after, &has_after, &error)) {
-        routes_fail(call, &error, 0);
+        routes_fail(call, &error);
         return;
     }
     struct store_entry entries[MAX_PAGE + 1];
@@ -190,7 +194,7 @@ void routes_describe(struct call *call)
     if (text)
         routes_json(call, 200, text);
     else
-        routes_fail(call, &error, 0);
+        routes_fail(call, &error);
 }
 
 void routes_delete(struct call *call)
@@ -198,7 +202,7 @@ void routes_delete(struct call *call)
     struct pen_error error = {0};
     enum store_kind kind = kind_of(call);
     if (!scene_store_remove(call->service->store, kind, call->id, &error)) {
-        routes_fail(call, &error, 0);
+        routes_fail(call, &error);
         return;
     }
     if (kind == STORE_SCENES)

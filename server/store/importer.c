@@ -54,17 +54,14 @@ static bool judge(struct importer *importer, int status, const struct pen_error 
     if (exited && report_bytes == (ssize_t)sizeof *report) {
         if (report->code == PEN_OK)
             return true;
-        bool sane = report->code >= 400 && report->code < 600;
-        return pen_fail(error, sane ? report->code : PEN_INTERNAL, report->pointer, "%.*s",
-            (int)strnlen(report->message, sizeof report->message), report->message);
+        struct pen_error told = *report;
+        pen_error_receive(&told);
+        return pen_fail(error, told.code, told.pointer, "%s", told.message);
     }
     count(importer, &importer->numbers.crashed);
     log_event(LOG_ERROR, "an importer %s", process_describe(status, text, sizeof text));
-    if (WIFSIGNALED(status) && WTERMSIG(status) == SIGKILL) {
-        pen_fail(error, PEN_INTERNAL, "", "The import was ended from outside.");
-        error->retryable = 1;
-        return false;
-    }
+    if (WIFSIGNALED(status) && WTERMSIG(status) == SIGKILL)
+        return pen_fail(error, PEN_LOST, "", "The import was ended from outside.");
     if (WIFEXITED(status) && (WEXITSTATUS(status) == 126 || WEXITSTATUS(status) == 127))
         return pen_fail(error, PEN_INTERNAL, "", "The importer could not be run.");
     return pen_fail(error, PEN_INVALID, "",

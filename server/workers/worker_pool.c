@@ -220,6 +220,16 @@ static void on_hello(struct slot *slot, const struct channel_hello *hello)
         slot->died_ns ? back_ms : clock_ms(clock_now_ns() - slot->spawned_ns), " ms");
 }
 
+static void on_refused(struct slot *slot, struct pen_error refused)
+{
+    pen_error_receive(&refused);
+    log_event(LOG_ERROR, "worker %u: %s", slot->index, refused.message);
+    pthread_mutex_lock(&slot->pool->lock);
+    if (!slot->pool->numbers.has_device)
+        slot->pool->numbers.refused = refused;
+    pthread_mutex_unlock(&slot->pool->lock);
+}
+
 static void on_warm(struct slot *slot, const struct channel_warm *warm)
 {
     struct worker_pool *pool = slot->pool;
@@ -239,6 +249,7 @@ static void on_done(
     if (!flight)
         return;
     struct pen_result result = message->result;
+    pen_error_receive(&result.error);
     struct outcome outcome = {.error = result.error};
     result.stage_ms[PEN_STAGE_QUEUE] =
         (float)clock_ms(flight->render->taken_ns - flight->render->queued_ns);
@@ -273,12 +284,7 @@ static bool on_message(
             on_hello(slot, &message->hello);
         return true;
     case CHANNEL_REFUSED:
-        log_event(LOG_ERROR, "worker %u: %.*s", slot->index,
-            (int)sizeof message->refused.message - 1, message->refused.message);
-        pthread_mutex_lock(&slot->pool->lock);
-        if (!slot->pool->numbers.has_device)
-            slot->pool->numbers.refused = message->refused;
-        pthread_mutex_unlock(&slot->pool->lock);
+        on_refused(slot, message->refused);
         return false;
     case CHANNEL_WARM:
         on_warm(slot, &message->warm);

@@ -20,7 +20,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t bytes)
             if (error.code != PEN_OK || !psc_open_memory(blob, blob_bytes, &scene, &error))
                 abort();
             free(blob);
-        } else if (error.code < 400 || error.code >= 500) {
+        } else if (pen_code_blame(error.code) != PEN_BLAME_CALLER) {
             abort(); /* nothing that a client sends is our fault */
         }
     }

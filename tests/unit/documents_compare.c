@@ -58,22 +58,22 @@ static void check_all(void)
 
 static void check_refused(void)
 {
-    refused("{" HARD ",\"techniques\":[\"pcss\",\"nothing\"]}", 422, "/techniques/1");
-    refused("{" HARD ",\"techniques\":[{\"name\":\"pcss\",\"params\":{\"bias\":\"x\"}}]}", 422,
-        "/techniques/0/params/bias");
-    refused("{" HARD ",\"techniques\":[\"none\"]}", 422, "/techniques/0");
-    refused("{" HARD ",\"techniques\":[7]}", 422, "/techniques/0");
-    refused(
-        "{\"reference\":{\"name\":\"hard\",\"params\":{\"no\":1}}}", 422, "/reference/params/no");
-    refused("{" HARD ",\"techniques\":{}}", 422, "/techniques");
-    refused("{" HARD ",\"technique\":\"pcss\"}", 422, "/technique");
-    refused("{" HARD ",\"output\":{}}", 422, "/output");
-    refused("{" HARD ",\"width\":0}", 422, "/width");
-    refused("{" HARD ",\"techniques\":\"all\",\"techniques\":\"all\"}", 422, "/techniques");
-    refused("{" HARD ",", 400, "");
-    refused("", 400, "");
+    refused("{" HARD ",\"techniques\":[\"pcss\",\"nothing\"]}", PEN_INVALID, "/techniques/1");
+    refused("{" HARD ",\"techniques\":[{\"name\":\"pcss\",\"params\":{\"bias\":\"x\"}}]}",
+        PEN_INVALID, "/techniques/0/params/bias");
+    refused("{" HARD ",\"techniques\":[\"none\"]}", PEN_INVALID, "/techniques/0");
+    refused("{" HARD ",\"techniques\":[7]}", PEN_INVALID, "/techniques/0");
+    refused("{\"reference\":{\"name\":\"hard\",\"params\":{\"no\":1}}}", PEN_INVALID,
+        "/reference/params/no");
+    refused("{" HARD ",\"techniques\":{}}", PEN_INVALID, "/techniques");
+    refused("{" HARD ",\"technique\":\"pcss\"}", PEN_INVALID, "/technique");
+    refused("{" HARD ",\"output\":{}}", PEN_INVALID, "/output");
+    refused("{" HARD ",\"width\":0}", PEN_INVALID, "/width");
+    refused("{" HARD ",\"techniques\":\"all\",\"techniques\":\"all\"}", PEN_INVALID, "/techniques");
+    refused("{" HARD ",", PEN_MALFORMED, "");
+    refused("", PEN_MALFORMED, "");
     /* This catalogue has neither raytraced nor what stands in for it. */
-    refused("{}", 422, "/reference/name");
+    refused("{}", PEN_INVALID, "/reference/name");
 }
 
 static void check_answer(void)

@@ -98,56 +98,65 @@ static void test_values(void)
 
 static void test_keys(void)
 {
-    refused("{\"widht\":1}", 422, "/widht", "did you mean \"width\"");
-    refused("{\"zzz\":1}", 422, "/zzz", "There is no key \"zzz\" here.");
-    refused("{\"Width\":1}", 422, "/Width", "did you mean \"width\"");
-    refused("{\"scene\":1}", 422, "/scene", "There is no key");
-    refused("{\"a/b~c\":1}", 422, "/a~1b~0c", "There is no key");
-    refused("{\"\":1}", 422, "/", "There is no key");
-    refused("{\"technique\":{\"nane\":1}}", 422, "/technique/nane", "did you mean \"name\"");
-    refused("{\"technique\":{\"params\":{\"search_tap\":1}}}", 422, "/technique/params/search_tap",
-        "did you mean \"search_taps\"");
-    refused("{\"technique\":{\"name\":\"hard\",\"params\":{\"search_taps\":1}}}", 422,
+    refused("{\"widht\":1}", PEN_INVALID, "/widht", "did you mean \"width\"");
+    refused("{\"zzz\":1}", PEN_INVALID, "/zzz", "There is no key \"zzz\" here.");
+    refused("{\"Width\":1}", PEN_INVALID, "/Width", "did you mean \"width\"");
+    refused("{\"scene\":1}", PEN_INVALID, "/scene", "There is no key");
+    refused("{\"a/b~c\":1}", PEN_INVALID, "/a~1b~0c", "There is no key");
+    refused("{\"\":1}", PEN_INVALID, "/", "There is no key");
+    refused(
+        "{\"technique\":{\"nane\":1}}", PEN_INVALID, "/technique/nane", "did you mean \"name\"");
+    refused("{\"technique\":{\"params\":{\"search_tap\":1}}}", PEN_INVALID,
+        "/technique/params/search_tap", "did you mean \"search_taps\"");
+    refused("{\"technique\":{\"name\":\"hard\",\"params\":{\"search_taps\":1}}}", PEN_INVALID,
         "/technique/params/search_taps", "There is no key");
-    refused("{\"camera\":{\"fov\":40}}", 422, "/camera/fov", "There is no key");
-    refused("{\"camera\":{\"fov_deg\":40}}", 422, "/camera/fov_deg", "mean \"fov_y_deg\"");
-    refused("{\"camera\":{\"azimuth_deg\":40}}", 422, "/camera/azimuth_deg", "There is no key");
-    refused("{\"camera\":{\"orbit\":{\"eye\":1}}}", 422, "/camera/orbit/eye", "There is no key");
-    refused("{\"lights\":[{},{\"colour\":[1,1,1]}]}", 422, "/lights/1/colour", "mean \"color\"");
-    refused("{\"lights\":[{\"texture\":{\"imag\":1}}]}", 422, "/lights/0/texture/imag",
+    refused("{\"camera\":{\"fov\":40}}", PEN_INVALID, "/camera/fov", "There is no key");
+    refused("{\"camera\":{\"fov_deg\":40}}", PEN_INVALID, "/camera/fov_deg", "mean \"fov_y_deg\"");
+    refused(
+        "{\"camera\":{\"azimuth_deg\":40}}", PEN_INVALID, "/camera/azimuth_deg", "There is no key");
+    refused("{\"camera\":{\"orbit\":{\"eye\":1}}}", PEN_INVALID, "/camera/orbit/eye",
+        "There is no key");
+    refused("{\"lights\":[{},{\"colour\":[1,1,1]}]}", PEN_INVALID, "/lights/1/colour",
+        "mean \"color\"");
+    refused("{\"lights\":[{\"texture\":{\"imag\":1}}]}", PEN_INVALID, "/lights/0/texture/imag",
         "mean \"image\"");
-    refused("{\"output\":{\"fromat\":\"png\"}}", 422, "/output/fromat", "mean \"format\"");
-    refused("{\"width\":10,\"width\":10}", 422, "/width", "given twice");
-    refused("{\"width\":10,\"w\\u0069dth\":10}", 422, "/width", "given twice");
-    refused("{\"technique\":{\"name\":\"hard\",\"name\":\"pcss\"}}", 422, "/technique/name",
+    refused("{\"output\":{\"fromat\":\"png\"}}", PEN_INVALID, "/output/fromat", "mean \"format\"");
+    refused("{\"width\":10,\"width\":10}", PEN_INVALID, "/width", "given twice");
+    refused("{\"width\":10,\"w\\u0069dth\":10}", PEN_INVALID, "/width", "given twice");
+    refused("{\"technique\":{\"name\":\"hard\",\"name\":\"pcss\"}}", PEN_INVALID, "/technique/name",
         "given twice");
-    refused("{\"camera\":{\"orbit\":{\"distance\":1,\"distance\":1}}}", 422,
+    refused("{\"camera\":{\"orbit\":{\"distance\":1,\"distance\":1}}}", PEN_INVALID,
         "/camera/orbit/distance", "given twice");
-    refused("{\"lights\":[{\"type\":\"sun\",\"type\":\"rect\"}]}", 422, "/lights/0/type",
+    refused("{\"lights\":[{\"type\":\"sun\",\"type\":\"rect\"}]}", PEN_INVALID, "/lights/0/type",
         "given twice");
     /* Keys that exclude each other or do not apply. */
-    refused("{\"camera\":{\"index\":0,\"orbit\":{}}}", 422, "/camera/orbit", "exclude");
-    refused("{\"camera\":{\"eye\":[1,1,1],\"index\":0}}", 422, "/camera/eye", "exclude");
-    refused("{\"camera\":{\"index\":0,\"fov_y_deg\":30}}", 422, "/camera/fov_y_deg", "has no");
-    refused("{\"camera\":{\"target\":[0,0,0]}}", 422, "/camera/target", "without an eye");
-    refused("{\"camera\":{\"orbit\":{},\"up\":[0,0,1]}}", 422, "/camera/up", "in orbit");
-    refused("{\"lights\":[{\"radius\":1}]}", 422, "/lights/0/radius", "A rect light has no radius");
-    refused("{\"lights\":[{\"type\":\"sun\",\"power_w\":1}]}", 422, "/lights/0/power_w", "sun");
-    refused("{\"lights\":[{\"width\":1,\"type\":\"sphere\"}]}", 422, "/lights/0/width", "sphere");
-    refused("{\"lights\":[{\"radiance\":1,\"power_w\":1}]}", 422, "/lights/0/radiance", "exclude");
-    refused("{\"lights\":[{\"type\":\"disk\",\"texture\":{\"pattern\":\"star\"}}]}", 422,
+    refused("{\"camera\":{\"index\":0,\"orbit\":{}}}", PEN_INVALID, "/camera/orbit", "exclude");
+    refused("{\"camera\":{\"eye\":[1,1,1],\"index\":0}}", PEN_INVALID, "/camera/eye", "exclude");
+    refused(
+        "{\"camera\":{\"index\":0,\"fov_y_deg\":30}}", PEN_INVALID, "/camera/fov_y_deg", "has no");
+    refused("{\"camera\":{\"target\":[0,0,0]}}", PEN_INVALID, "/camera/target", "without an eye");
+    refused("{\"camera\":{\"orbit\":{},\"up\":[0,0,1]}}", PEN_INVALID, "/camera/up", "in orbit");
+    refused("{\"lights\":[{\"radius\":1}]}", PEN_INVALID, "/lights/0/radius",
+        "A rect light has no radius");
+    refused(
+        "{\"lights\":[{\"type\":\"sun\",\"power_w\":1}]}", PEN_INVALID, "/lights/0/power_w", "sun");
+    refused("{\"lights\":[{\"width\":1,\"type\":\"sphere\"}]}", PEN_INVALID, "/lights/0/width",
+        "sphere");
+    refused("{\"lights\":[{\"radiance\":1,\"power_w\":1}]}", PEN_INVALID, "/lights/0/radiance",
+        "exclude");
+    refused("{\"lights\":[{\"type\":\"disk\",\"texture\":{\"pattern\":\"star\"}}]}", PEN_INVALID,
         "/lights/0/texture", "has no texture");
-    refused("{\"lights\":[{\"texture\":{}}]}", 422, "/lights/0/texture", "either");
+    refused("{\"lights\":[{\"texture\":{}}]}", PEN_INVALID, "/lights/0/texture", "either");
     refused("{\"lights\":[{\"texture\":{\"pattern\":\"star\",\"image\":\"00000000000000000000000000"
             "00000000000000000000000000000000000000\"}}]}",
-        422, "/lights/0/texture", "either");
-    refused("{\"lights\":[{},{},{},{},{},{},{},{},{}]}", 422, "/lights", "At most 8");
+        PEN_INVALID, "/lights/0/texture", "either");
+    refused("{\"lights\":[{},{},{},{},{},{},{},{},{}]}", PEN_INVALID, "/lights", "At most 8");
     CHECK(parse("{\"lights\":[{},{},{},{},{},{},{},{}]}") && request.light_count == 8);
     /* A key too long for the pointer: the pointer stays valid, and names the parent. */
     char text[600] = "{\"lights\":[{\"";
     memset(text + strlen(text), 'x', 300);
     strcat(text, "\":1}]}");
-    refused(text, 422, "/lights/0", "There is no key \"xxxxxxxx");
+    refused(text, PEN_INVALID, "/lights/0", "There is no key \"xxxxxxxx");
 }
 
 static void test_types(void)
@@ -155,49 +164,51 @@ static void test_types(void)
     static const char *const not_objects[] = {"1", "\"x\"", "true", "null", "[]"};
     for (int i = 0; i < 5; i++) {
         char text[80];
-        refused(not_objects[i], 422, "", "object");
+        refused(not_objects[i], PEN_INVALID, "", "object");
         snprintf(text, sizeof text, "{\"camera\":%s}", not_objects[i]);
-        refused(text, 422, "/camera", "object");
+        refused(text, PEN_INVALID, "/camera", "object");
         snprintf(text, sizeof text, "{\"output\":%s}", not_objects[i]);
-        refused(text, 422, "/output", "object");
+        refused(text, PEN_INVALID, "/output", "object");
         snprintf(text, sizeof text, "{\"lights\":[%s]}", not_objects[i]);
-        refused(text, 422, "/lights/0", "object");
+        refused(text, PEN_INVALID, "/lights/0", "object");
         snprintf(text, sizeof text, "{\"technique\":{\"params\":%s}}", not_objects[i]);
-        refused(text, 422, "/technique/params", "object");
+        refused(text, PEN_INVALID, "/technique/params", "object");
         if (i != 1) {
             snprintf(text, sizeof text, "{\"technique\":%s}", not_objects[i]);
-            refused(text, 422, "/technique", "name or an object");
+            refused(text, PEN_INVALID, "/technique", "name or an object");
             snprintf(text, sizeof text, "{\"tone_map\":%s}", not_objects[i]);
-            refused(text, 422, "/tone_map", "must be a string");
+            refused(text, PEN_INVALID, "/tone_map", "must be a string");
         }
         if (i != 0) {
             snprintf(text, sizeof text, "{\"width\":%s}", not_objects[i]);
-            refused(text, 422, "/width", "must be a number");
+            refused(text, PEN_INVALID, "/width", "must be a number");
         }
         if (i != 2) {
             snprintf(text, sizeof text, "{\"ground\":%s}", not_objects[i]);
-            refused(text, 422, "/ground", "true or false");
+            refused(text, PEN_INVALID, "/ground", "true or false");
         }
         snprintf(text, sizeof text, "{\"ambient\":%s}", not_objects[i]);
-        refused(text, 422, "/ambient", "array of 3 numbers");
+        refused(text, PEN_INVALID, "/ambient", "array of 3 numbers");
     }
-    refused("{\"lights\":{}}", 422, "/lights", "array");
-    refused("{\"lights\":null}", 422, "/lights", "array");
-    refused("{\"ambient\":[1,2]}", 422, "/ambient", "array of 3");
-    refused("{\"ambient\":[1,2,3,4]}", 422, "/ambient", "array of 3");
-    refused("{\"ambient\":[1,\"2\",3]}", 422, "/ambient/1", "number");
-    refused("{\"camera\":{\"eye\":[1,2,[3]]}}", 422, "/camera/eye/2", "number");
-    refused("{\"technique\":\"pcs\"}", 422, "/technique", "did you mean \"pcss\"");
-    refused("{\"technique\":{\"name\":\"vsm\"}}", 422, "/technique/name", "no method called");
-    refused("{\"technique\":{\"name\":7}}", 422, "/technique/name", "string");
-    refused("{\"tone_map\":\"acse\"}", 422, "/tone_map", "did you mean \"aces\"");
-    refused("{\"tone_map\":\"filmic\"}", 422, "/tone_map", "none, reinhard, aces");
-    refused("{\"lights\":[{\"type\":\"area\"}]}", 422, "/lights/0/type", "rect, disk, sphere");
-    refused("{\"lights\":[{\"type\":4}]}", 422, "/lights/0/type", "string");
-    refused("{\"lights\":[{\"texture\":{\"pattern\":\"chequer\"}}]}", 422,
+    refused("{\"lights\":{}}", PEN_INVALID, "/lights", "array");
+    refused("{\"lights\":null}", PEN_INVALID, "/lights", "array");
+    refused("{\"ambient\":[1,2]}", PEN_INVALID, "/ambient", "array of 3");
+    refused("{\"ambient\":[1,2,3,4]}", PEN_INVALID, "/ambient", "array of 3");
+    refused("{\"ambient\":[1,\"2\",3]}", PEN_INVALID, "/ambient/1", "number");
+    refused("{\"camera\":{\"eye\":[1,2,[3]]}}", PEN_INVALID, "/camera/eye/2", "number");
+    refused("{\"technique\":\"pcs\"}", PEN_INVALID, "/technique", "did you mean \"pcss\"");
+    refused(
+        "{\"technique\":{\"name\":\"vsm\"}}", PEN_INVALID, "/technique/name", "no method called");
+    refused("{\"technique\":{\"name\":7}}", PEN_INVALID, "/technique/name", "string");
+    refused("{\"tone_map\":\"acse\"}", PEN_INVALID, "/tone_map", "did you mean \"aces\"");
+    refused("{\"tone_map\":\"filmic\"}", PEN_INVALID, "/tone_map", "none, reinhard, aces");
+    refused(
+        "{\"lights\":[{\"type\":\"area\"}]}", PEN_INVALID, "/lights/0/type", "rect, disk, sphere");
+    refused("{\"lights\":[{\"type\":4}]}", PEN_INVALID, "/lights/0/type", "string");
+    refused("{\"lights\":[{\"texture\":{\"pattern\":\"chequer\"}}]}", PEN_INVALID,
         "/lights/0/texture/pattern", "checker");
-    refused("{\"lights\":[{\"texture\":{\"image\":\"abc\"}}]}", 422, "/lights/0/texture/image",
-        "64 lower-case");
+    refused("{\"lights\":[{\"texture\":{\"image\":\"abc\"}}]}", PEN_INVALID,
+        "/lights/0/texture/image", "64 lower-case");
 }
 
 /* Both sides of every range, from the rows. `frame` has one %s for the value. */
@@ -235,7 +246,7 @@ static uint32_t rows_out_of_range(
             snprintf(member, sizeof member, "\"%s\":%s", row->name, value);
             snprintf(text, sizeof text, frame, member);
             snprintf(at, sizeof at, "%s/%s", pointer, row->name);
-            refused(text, 422, at,
+            refused(text, PEN_INVALID, at,
                 side == 2 || side == 3 ? "finite"
                 : fraction             ? "whole"
                                        : "must lie in");
@@ -269,30 +280,31 @@ static void test_ranges(void)
               "/technique/params", 0) > 14);
 
     /* 10^9 pixels, by one side and by both. */
-    refused("{\"width\":1000000000,\"height\":1}", 422, "/width", "must lie in");
-    refused("{\"width\":31623,\"height\":31623}", 422, "/width", "must lie in");
-    refused("{\"width\":8192,\"height\":8192}", 422, "/width", "pixels");
+    refused("{\"width\":1000000000,\"height\":1}", PEN_INVALID, "/width", "must lie in");
+    refused("{\"width\":31623,\"height\":31623}", PEN_INVALID, "/width", "must lie in");
+    refused("{\"width\":8192,\"height\":8192}", PEN_INVALID, "/width", "pixels");
     CHECK(parse("{\"width\":4096,\"height\":4096}"));
-    refused("{\"width\":4097,\"height\":4096}", 422, "/width", "pixels");
-    refused("{\"width\":99999999999999999999,\"height\":1}", 422, "/width", "must lie in");
+    refused("{\"width\":4097,\"height\":4096}", PEN_INVALID, "/width", "pixels");
+    refused("{\"width\":99999999999999999999,\"height\":1}", PEN_INVALID, "/width", "must lie in");
     /* What no single row can say. */
-    refused("{\"camera\":{\"eye\":[1,2,3],\"target\":[1,2,3]}}", 422, "/camera", "differ");
-    refused("{\"camera\":{\"eye\":[1,2,3],\"up\":[0,0,0]}}", 422, "/camera", "up");
-    refused("{\"output\":{\"layer\":\"all\"}}", 422, "/output/layer", "exr");
-    refused("{\"output\":{\"bit_depth\":7}}", 422, "/output/bit_depth", "png");
-    refused("{\"lights\":[{\"type\":\"spot\",\"inner_cone_deg\":50}]}", 422, "/lights/0", "inner");
+    refused("{\"camera\":{\"eye\":[1,2,3],\"target\":[1,2,3]}}", PEN_INVALID, "/camera", "differ");
+    refused("{\"camera\":{\"eye\":[1,2,3],\"up\":[0,0,0]}}", PEN_INVALID, "/camera", "up");
+    refused("{\"output\":{\"layer\":\"all\"}}", PEN_INVALID, "/output/layer", "exr");
+    refused("{\"output\":{\"bit_depth\":7}}", PEN_INVALID, "/output/bit_depth", "png");
+    refused("{\"lights\":[{\"type\":\"spot\",\"inner_cone_deg\":50}]}", PEN_INVALID, "/lights/0",
+        "inner");
 }
 
 static void test_bodies(void)
 {
     static char big[PEN_MAX_JSON_BYTES + 2];
-    refused("", 400, "", "empty");
-    refused("{", 400, "", "byte 1");
-    refused("{\"width\":}", 400, "", "byte 9");
-    refused("{\"width\":NaN}", 400, "", "byte 9");
-    refused("{\"width\":Infinity}", 400, "", "byte 9");
-    refused("{\"width\":1}x", 400, "", "byte 11");
-    refused("{\"width\\u0000\":1}", 400, "", "NUL");
+    refused("", PEN_MALFORMED, "", "empty");
+    refused("{", PEN_MALFORMED, "", "byte 1");
+    refused("{\"width\":}", PEN_MALFORMED, "", "byte 9");
+    refused("{\"width\":NaN}", PEN_MALFORMED, "", "byte 9");
+    refused("{\"width\":Infinity}", PEN_MALFORMED, "", "byte 9");
+    refused("{\"width\":1}x", PEN_MALFORMED, "", "byte 11");
+    refused("{\"width\\u0000\":1}", PEN_MALFORMED, "", "NUL");
     /* 64 KiB is the limit, to the byte. */
     memset(big, ' ', sizeof big);
     big[0] = '{';
@@ -301,13 +313,13 @@ static void test_bodies(void)
     CHECK(pen_request_from_json(big, PEN_MAX_JSON_BYTES, &fake_catalogue, &request, &error));
     error = (struct pen_error){0};
     CHECK(!pen_request_from_json(big, PEN_MAX_JSON_BYTES + 1, &fake_catalogue, &request, &error));
-    CHECK(error.code == 413);
+    CHECK(error.code == PEN_TOO_BIG);
     /* The text needs no NUL behind it. */
     error = (struct pen_error){0};
     CHECK(pen_request_from_json("{\"width\":123}", 13, &fake_catalogue, &request, &error));
     error = (struct pen_error){0};
     CHECK(!pen_request_from_json("{\"width\":123}", 12, &fake_catalogue, &request, &error));
-    CHECK(error.code == 400);
+    CHECK(error.code == PEN_MALFORMED);
     /* Nesting: 32 is read (and refused for what it says), 33 is not. */
     for (int depth = 32; depth <= 33; depth++) {
         char text[128] = "{\"width\":";
@@ -316,14 +328,14 @@ static void test_bodies(void)
         memset(text + at + depth - 1, ']', (size_t)depth - 1);
         strcpy(text + at + 2 * (depth - 1), "}");
         if (depth == 32)
-            refused(text, 422, "/width", "number");
+            refused(text, PEN_INVALID, "/width", "number");
         else
-            refused(text, 400, "", "nested more than 32");
+            refused(text, PEN_MALFORMED, "", "nested more than 32");
     }
     memset(big, '[', 60000);
     error = (struct pen_error){0};
     CHECK(!pen_request_from_json(big, 60000, &fake_catalogue, &request, &error));
-    CHECK(error.code == 400);
+    CHECK(error.code == PEN_MALFORMED);
 }
 
 int main(void)

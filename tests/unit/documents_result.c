@@ -212,7 +212,7 @@ static void test_problem(void)
 {
     struct pen_error error = {0};
     pen_fail(&error, PEN_INVALID, "/width", "width is \"%s\".", "\x80\x01");
-    cJSON *root = parsed(pen_problem_json(&error, "id-1"));
+    cJSON *root = parsed(pen_problem_json(&error, 422, "Unprocessable Content", false, "id-1"));
     CHECK_STR(at(root, "type")->valuestring, "about:blank");
     CHECK_STR(at(root, "title")->valuestring, "Unprocessable Content");
     CHECK_NEAR(at(root, "status")->valuedouble, 422, 0);
@@ -223,7 +223,7 @@ static void test_problem(void)
     cJSON_Delete(root);
     error = (struct pen_error){0};
     pen_fail(&error, PEN_UNAVAILABLE, "", "Full.");
-    root = parsed(pen_problem_json(&error, NULL));
+    root = parsed(pen_problem_json(&error, 503, "Service Unavailable", true, NULL));
     CHECK(cJSON_IsTrue(at(root, "retryable")) && !at(root, "pointer") && !at(root, "request_id"));
     cJSON_Delete(root);
 }

@@ -38,8 +38,8 @@ int main(void)
             free(run.blob);
             run = run_importer(path, NULL);
         }
-        bool refused = run.status == 0 && run.reported && run.error.code >= 400 &&
-                       run.error.code < 500 && run.error.message[0] &&
+        bool refused = run.status == 0 && run.reported &&
+                       pen_code_blame(run.error.code) == PEN_BLAME_CALLER && run.error.message[0] &&
                        printable(run.error.message) && printable(run.error.pointer) && !run.blob;
         if (!refused || run.seconds >= SECONDS || run.memory_mb >= MEGABYTES) {
             fprintf(stderr, "%s: status %d, code %u, %.2f s, %ld MB: %s\n", entry->d_name,

@@ -36,15 +36,14 @@ static bool submit(struct scheduler *s, struct client *client, uint8_t key, bool
 {
     struct pen_request request = {.width = key};
     uint8_t id[PEN_ID_BYTES] = {key};
-    uint32_t retry;
     memset(client, 0, sizeof *client);
     request.delivery.priority = batch ? PEN_PRIORITY_BATCH : PEN_PRIORITY_INTERACTIVE;
     client->waiter = (struct waiter){.client = who,
         .deadline_ns = clock_now_ns() + deadline_ms * CLOCK_MS,
         .is_gone = is_gone,
         .finish = finish};
-    bool ok = scheduler_submit(s, &request, id, shareable, &client->waiter, &retry, error);
-    CHECK(retry >= 1 && retry <= 60);
+    bool ok = scheduler_submit(s, &request, id, shareable, &client->waiter, error);
+    CHECK(ok || !error || (error->retry_after_s >= 1 && error->retry_after_s <= 60));
     return ok;
 }
 
@@ -106,11 +105,11 @@ static void test_limits(void)
     CHECK(submit(s, &c[0], 1, false, true, 7, 1000, &error));
     CHECK(submit(s, &c[1], 2, false, true, 7, 1000, &error));
     CHECK(!submit(s, &c[2], 3, false, true, 7, 1000, &error));
-    CHECK(error.code == PEN_TOO_MANY && error.retryable);
+    CHECK(error.code == PEN_TOO_MANY && error.retry_after_s);
     error.code = 0;
     CHECK(submit(s, &c[3], 3, false, true, 8, 1000, &error));
     CHECK(!submit(s, &c[4], 4, false, true, 9, 1000, &error));
-    CHECK(error.code == PEN_UNAVAILABLE && error.retryable);
+    CHECK(error.code == PEN_UNAVAILABLE && error.retry_after_s);
     error.code = 0;
     /* One that joins needs no room in the queue. */
     CHECK(submit(s, &c[4], 3, false, true, 9, 1000, &error));

@@ -2,6 +2,7 @@
 #include "protocol/request.h"
 #include "server/http/accept.h"
 #include "server/http/auth.h"
+#include "server/http/status.h"
 #include "server/base/config.h"
 #include "server/workers/quarantine.h"
 #include "tests/unit/check.h"
@@ -68,6 +69,31 @@ static void test_accept(void)
     CHECK(!accept_record("image/png, application/json;q=0.5"));
 }
 
+/* Every code has a status of its class, and what comes from elsewhere is made safe. */
+static void test_codes(void)
+{
+    for (uint32_t code = PEN_OK + 1; code < PEN_CODES; code++) {
+        struct http_status told = http_status_of((enum pen_code)code);
+        bool callers = pen_code_blame(code) == PEN_BLAME_CALLER;
+        CHECK(told.status / 100 == (callers ? 4u : 5u));
+        CHECK_STR(http_status_title(told.status), told.title);
+        CHECK(*pen_code_name(code));
+    }
+    static const uint32_t odd[] = {PEN_UNAUTHORIZED, PEN_TOO_MANY, PEN_CODES, 422, UINT32_MAX};
+    for (size_t i = 0; i < sizeof odd / sizeof *odd; i++) {
+        struct pen_error error = {.code = odd[i]};
+        memset(error.message, 'x', sizeof error.message);
+        memset(error.pointer, 'x', sizeof error.pointer);
+        pen_error_receive(&error);
+        CHECK(error.code == PEN_INTERNAL);
+        CHECK(strlen(error.message) == sizeof error.message - 1);
+        CHECK(strlen(error.pointer) == sizeof error.pointer - 1);
+    }
+    struct pen_error kept = {.code = PEN_LOST};
+    pen_error_receive(&kept);
+    CHECK(kept.code == PEN_LOST);
+}
+
 static void test_auth(void)
 {
     char path[] = "/tmp/penumbra-tokens-XXXXXX";
@@ -124,6 +150,7 @@ int main(void)
 {
     test_config();
     test_accept();
+    test_codes();
     test_auth();
     test_quarantine();
     CHECK_DONE();

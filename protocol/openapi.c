@@ -26,34 +26,24 @@ static void write_media(struct pen_json *json, const char *type, const char *sch
 static void write_content(struct pen_json *json, enum pen_body body)
 {
     static const char *const schemas[] = {
-        [PEN_BODY_REQUEST] = SCHEMA "RenderRequest",
-        [PEN_BODY_TECHNIQUES] = SCHEMA "TechniqueList",
-        [PEN_BODY_TECHNIQUE] = SCHEMA "TechniqueInfo",
-        [PEN_BODY_SCENES] = SCHEMA "SceneList",
-        [PEN_BODY_SCENE] = SCHEMA "Scene",
-        [PEN_BODY_IMAGES] = SCHEMA "ImageList",
-        [PEN_BODY_IMAGE_INFO] = SCHEMA "ImageInfo",
-        [PEN_BODY_STATS] = NULL,
-        [PEN_BODY_COMPARE] = SCHEMA "CompareRequest",
-        [PEN_BODY_COMPARISON] = SCHEMA "Comparison",
+#define DERIVED(name, writer) [PEN_BODY_##name] = SCHEMA #name,
+#define WRITTEN(name) [PEN_BODY_##name] = SCHEMA #name,
+#include "protocol/schemas.def"
     };
     pen_json_object(json, "content");
     switch (body) {
     case PEN_BODY_SCENE_UPLOAD:
-        write_media(json, "model/gltf-binary", NULL);
-        write_media(json, "model/gltf+json", NULL);
-        write_media(json, "multipart/form-data", NULL);
-        write_media(json, "application/zip", NULL);
-        break;
     case PEN_BODY_IMAGE_UPLOAD:
-        write_media(json, "image/png", NULL);
-        write_media(json, "image/jpeg", NULL);
-        write_media(json, "image/webp", NULL);
+        for (const char *const *type = pen_upload_types(body); *type; type++)
+            write_media(json, *type, NULL);
         break;
-    case PEN_BODY_IMAGE:
+    case PEN_BODY_PICTURE:
         for (uint32_t i = 0; i < PEN_FORMATS; i++)
             write_media(json, pen_format_mime[i], NULL);
         write_media(json, "application/json", SCHEMA "Record");
+        break;
+    case PEN_BODY_PAGE:
+        write_media(json, "text/html", NULL);
         break;
     default:
         write_media(json, "application/json", schemas[body]);
@@ -84,7 +74,7 @@ static void write_response(
 {
     pen_json_object(json, status);
     pen_json_string(json, "description", description);
-    if (body == PEN_BODY_IMAGE)
+    if (body == PEN_BODY_PICTURE)
         write_image_headers(json);
     if (body != PEN_BODY_NONE)
         write_content(json, body);
@@ -182,7 +172,7 @@ static void write_request_queries(struct pen_json *json, const struct pen_catalo
     pen_json_string(json, "name", "request");
     pen_json_string(json, "in", "query");
     pen_json_string(json, "description", "A whole request as JSON, instead of the other keys.");
-    write_content(json, PEN_BODY_REQUEST);
+    write_content(json, PEN_BODY_RenderRequest);
     pen_json_end(json);
 }
 
@@ -240,8 +230,7 @@ static void write_operation(
     if (route->flags & PEN_ROUTE_CREATES)
         write_response(json, "201", "Stored; Location says where.", route->gives);
     if (route->flags & PEN_ROUTE_CONDITIONAL)
-        write_response(
-            json, "304", "If-None-Match names the image that this request gives.", PEN_BODY_NONE);
+        write_response(json, "304", "If-None-Match names what this request gives.", PEN_BODY_NONE);
     write_ref(json, "default", "#/components/responses/Problem");
     pen_json_end(json);
     pen_json_end(json);

@@ -1,10 +1,9 @@
 #include "protocol/openapi_schema.h"
-#include "protocol/request.h"
+#include "protocol/result.h"
 #include <stdio.h>
 #include <string.h>
 
 #define SCHEMA "#/components/schemas/"
-#define ID_PATTERN "^[0-9a-f]{64}$"
 
 static void write_ref(struct pen_json *json, const char *key, const char *target)
 {
@@ -104,7 +103,8 @@ static void forbid_rows(struct pen_json *json, struct pen_param_table table, uin
     pen_json_end(json);
 }
 
-static void write_technique_object(struct pen_json *json, const struct pen_technique_info *info)
+/* A method with its parameters, as "Technique-<name>". */
+static void write_method(struct pen_json *json, const struct pen_technique_info *info)
 {
     static const char *const required[] = {"name", NULL};
     char key[64];
@@ -125,10 +125,9 @@ static void write_technique_object(struct pen_json *json, const struct pen_techn
     close_object(json);
 }
 
-static void write_techniques(struct pen_json *json, const struct pen_catalogue *catalogue)
+static void write_technique_name(struct pen_json *json, const struct pen_catalogue *catalogue)
 {
     struct pen_request defaults;
-    char target[96];
     pen_request_default(&defaults, catalogue);
     pen_json_object(json, "TechniqueName");
     pen_json_string(json, "type", "string");
@@ -138,7 +137,11 @@ static void write_techniques(struct pen_json *json, const struct pen_catalogue *
     pen_json_end(json);
     pen_json_string(json, "default", defaults.technique);
     pen_json_end(json);
+}
 
+static void write_technique_object(struct pen_json *json, const struct pen_catalogue *catalogue)
+{
+    char target[96];
     pen_json_object(json, "TechniqueObject");
     pen_json_array(json, "oneOf");
     for (uint32_t i = 0; i < catalogue->count; i++) {
@@ -156,7 +159,13 @@ static void write_techniques(struct pen_json *json, const struct pen_catalogue *
     pen_json_end(json);
     pen_json_end(json);
     pen_json_end(json);
+    for (uint32_t i = 0; i < catalogue->count; i++)
+        write_method(json, catalogue->items[i]);
+}
 
+static void write_technique(struct pen_json *json, const struct pen_catalogue *catalogue)
+{
+    (void)catalogue;
     pen_json_object(json, "Technique");
     pen_json_string(json, "description", "A method's name, or its name and parameters.");
     pen_json_array(json, "oneOf");
@@ -164,13 +173,11 @@ static void write_techniques(struct pen_json *json, const struct pen_catalogue *
     write_ref(json, NULL, SCHEMA "TechniqueObject");
     pen_json_end(json);
     pen_json_end(json);
-
-    for (uint32_t i = 0; i < catalogue->count; i++)
-        write_technique_object(json, catalogue->items[i]);
 }
 
-static void write_camera(struct pen_json *json)
+static void write_camera(struct pen_json *json, const struct pen_catalogue *catalogue)
 {
+    (void)catalogue;
     const uint32_t orbit = PEN_CAMERA_BIT(PEN_CAMERA_ORBIT);
     const uint32_t look_at = PEN_CAMERA_BIT(PEN_CAMERA_LOOK_AT);
     static const char *const eye[] = {"eye", NULL};
@@ -203,12 +210,12 @@ static void write_camera(struct pen_json *json)
     pen_json_end(json);
 }
 
-static void write_texture(struct pen_json *json)
+static void write_texture(struct pen_json *json, const struct pen_catalogue *catalogue)
 {
+    (void)catalogue;
     open_object(json, "LightTexture", "What a rect light emits over its area; black cuts shapes.");
     pen_json_object(json, "image");
-    pen_json_string(json, "type", "string");
-    pen_json_string(json, "pattern", ID_PATTERN);
+    pen_json_string(json, "$ref", SCHEMA "Id");
     pen_json_string(json, "description", "The id of an uploaded image.");
     pen_json_end(json);
     pen_json_object(json, "pattern");
@@ -221,8 +228,9 @@ static void write_texture(struct pen_json *json)
     pen_json_end(json);
 }
 
-static void write_light(struct pen_json *json)
+static void write_light(struct pen_json *json, const struct pen_catalogue *catalogue)
 {
+    (void)catalogue;
     static const char *const type_key[] = {"type", NULL};
     struct pen_param_table table = pen_light_table();
     open_object(json, "Light", "A light; the rows that it takes depend on its type.");
@@ -256,8 +264,9 @@ static void write_light(struct pen_json *json)
     pen_json_end(json);
 }
 
-static void write_request(struct pen_json *json)
+static void write_request(struct pen_json *json, const struct pen_catalogue *catalogue)
 {
+    (void)catalogue;
     open_object(json, "RenderRequest", "Every key may be left out; {} gives a picture.");
     write_ref(json, "technique", SCHEMA "Technique");
     write_ref(json, "camera", SCHEMA "Camera");
@@ -272,6 +281,11 @@ static void write_request(struct pen_json *json)
     write_ref(json, "output", SCHEMA "Output");
     write_rows(json, pen_delivery_table());
     close_object(json);
+}
+
+static void write_output(struct pen_json *json, const struct pen_catalogue *catalogue)
+{
+    (void)catalogue;
     open_object(json, "Output", NULL);
     write_rows(json, pen_output_table());
     close_object(json);
@@ -287,8 +301,9 @@ static void write_row_refs(struct pen_json *json, struct pen_param_table table)
     }
 }
 
-static void write_compare(struct pen_json *json)
+static void write_compare(struct pen_json *json, const struct pen_catalogue *catalogue)
 {
+    (void)catalogue;
     open_object(
         json, "CompareRequest", "A render request with a list of methods; {} compares all.");
     pen_json_raw(json, "techniques",
@@ -305,120 +320,33 @@ static void write_compare(struct pen_json *json)
     close_object(json);
 }
 
-/* Documents that only come back: their shape, as JSON text. */
-static const char *const answers[][2] = {
-    {"Problem",
-        "{\"type\":\"object\",\"description\":\"RFC 9457.\",\"required\":[\"type\",\"title\","
-        "\"status\",\"detail\",\"retryable\"],\"properties\":{\"type\":{\"type\":\"string\"},"
-        "\"title\":{\"type\":\"string\"},\"status\":{\"type\":\"integer\"},\"detail\":{\"type\":"
-        "\"string\"},\"pointer\":{\"type\":\"string\",\"description\":\"RFC 6901 pointer to the "
-        "key "
-        "that is wrong.\"},\"retryable\":{\"type\":\"boolean\",\"description\":\"The same request "
-        "may succeed later.\"},\"request_id\":{\"type\":\"string\"}}}"},
-    {"Id", "{\"type\":\"string\",\"pattern\":\"" ID_PATTERN
-           "\",\"description\":\"SHA-256 of the uploaded bytes.\"}"},
-    {"Vector", "{\"type\":\"array\",\"items\":{\"type\":\"number\"},\"minItems\":3,"
-               "\"maxItems\":3}"},
-    {"Scene",
-        "{\"type\":\"object\",\"required\":[\"id\",\"triangles\"],\"properties\":{\"id\":{\"$ref\":"
-        "\"" SCHEMA
-        "Id\"},\"triangles\":{\"type\":\"integer\"},\"vertices\":{\"type\":\"integer\"},"
-        "\"primitives\":{\"type\":\"integer\"},\"instances\":{\"type\":\"integer\"},\"materials\":"
-        "{\"type\":\"integer\"},\"textures\":{\"type\":\"integer\"},\"images\":{\"type\":"
-        "\"integer\"},\"animations\":{\"type\":\"integer\"},\"source_bytes\":{\"type\":\"integer\"}"
-        ","
-        "\"stored_bytes\":{\"type\":\"integer\"},\"gpu_bytes\":{\"type\":\"integer\"},\"resident\":"
-        "{\"type\":\"boolean\"},\"stored_at\":{\"type\":\"string\",\"format\":\"date-time\"},"
-        "\"bounds\":{\"oneOf\":[{\"type\":\"null\"},{\"type\":\"object\",\"properties\":{\"min\":"
-        "{\"$ref\":\"" SCHEMA "Vector\"},\"max\":{\"$ref\":\"" SCHEMA "Vector\"}}}]},\"cameras\":"
-        "{\"type\":\"array\",\"items\":{\"type\":\"object\",\"properties\":{\"index\":{\"type\":"
-        "\"integer\"},\"name\":{\"type\":\"string\"},\"eye\":{\"$ref\":\"" SCHEMA "Vector\"},"
-        "\"target\":{\"$ref\":\"" SCHEMA "Vector\"},\"up\":{\"$ref\":\"" SCHEMA "Vector\"},"
-        "\"fov_y_deg\":{\"type\":\"number\"}}}},\"lights\":{\"type\":\"array\",\"items\":{\"type\":"
-        "\"object\",\"properties\":{\"name\":{\"type\":\"string\"},\"light\":{\"$ref\":\"" SCHEMA
-        "Light\"}}}},\"warnings\":{\"type\":\"array\",\"items\":{\"type\":\"string\"}}}}"},
-    {"SceneList",
-        "{\"type\":\"object\",\"properties\":{\"scenes\":{\"type\":\"array\",\"items\":"
-        "{\"$ref\":\"" SCHEMA "Scene\"}},\"total\":{\"type\":\"integer\"},"
-        "\"next\":{\"type\":\"string\",\"description\":\"The next page, when there is one.\"}}}"},
-    {"ImageInfo", "{\"type\":\"object\",\"properties\":{\"id\":{\"$ref\":\"" SCHEMA
-                  "Id\"},\"width\":{\"type\":\"integer\"},\"height\":{\"type\":\"integer\"},"
-                  "\"source_bytes\":{\"type\":\"integer\"},\"stored_bytes\":{\"type\":\"integer\"},"
-                  "\"stored_at\":{\"type\":\"string\",\"format\":\"date-time\"}}}"},
-    {"ImageList",
-        "{\"type\":\"object\",\"properties\":{\"images\":{\"type\":\"array\",\"items\":"
-        "{\"$ref\":\"" SCHEMA "ImageInfo\"}},\"total\":{\"type\":\"integer\"},"
-        "\"next\":{\"type\":\"string\",\"description\":\"The next page, when there is one.\"}}}"},
-    {"TechniqueInfo",
-        "{\"type\":\"object\",\"properties\":{\"name\":{\"$ref\":\"" SCHEMA
-        "TechniqueName\"},\"title\":{\"type\":\"string\"},\"summary\":{\"type\":\"string\"},"
-        "\"citation\":{\"type\":\"string\"},\"artefacts\":{\"type\":\"string\"},\"cost_class\":"
-        "{\"enum\":[\"cheap\",\"medium\",\"heavy\",\"reference\"]},\"textured\":{\"type\":"
-        "\"boolean\"},\"params\":{\"type\":\"array\",\"items\":{\"type\":\"object\"}}}}"},
-    {"TechniqueList", "{\"type\":\"object\",\"properties\":{\"techniques\":{\"type\":\"array\","
-                      "\"items\":{\"$ref\":\"" SCHEMA "TechniqueInfo\"}}}}"},
-    {"ComparedMethod",
-        "{\"type\":\"object\",\"description\":\"Errors are of the mean visibility, ssim and flip "
-        "of "
-        "the display picture. A method that failed has only "
-        "error.\",\"properties\":{\"technique\":{"
-        "\"$ref\":\"" SCHEMA
-        "TechniqueObject\"},\"error\":{\"type\":\"string\"},\"rmse\":{\"type\":\"number\"},"
-        "\"rmse_penumbra\":{\"type\":[\"number\",\"null\"],\"description\":\"Where the reference "
-        "lies between 0.02 and 0.98; null: nowhere.\"},\"mean_error\":{\"type\":\"number\"},"
-        "\"largest_error\":{\"type\":\"number\"},\"ssim\":{\"type\":\"number\"},\"flip\":{"
-        "\"type\":\"number\"},\"penumbra_pixels\":{\"type\":\"integer\"},\"total_ms\":{\"type\":"
-        "\"number\",\"description\":\"G-buffer, shadow inputs, method and shading, with nothing "
-        "cached.\"},\"shadow_ms\":{\"type\":\"number\",\"description\":\"Shadow inputs and "
-        "method.\"},\"stages_ms\":{\"type\":\"object\",\"additionalProperties\":{\"type\":"
-        "\"number\"}},\"passes\":{\"type\":\"array\",\"items\":{\"type\":\"object\"}},\"warnings\":"
-        "{\"type\":\"array\",\"items\":{\"type\":\"string\"}},\"links\":{\"type\":\"object\","
-        "\"properties\":{\"image\":{\"type\":\"string\"},\"difference\":{\"type\":\"string\","
-        "\"description\":\"White: equal, red: too light, blue: too dark.\"},\"ssim_map\":{\"type\":"
-        "\"string\"},\"flip_map\":{\"type\":\"string\"}}}}}"},
-    {"Comparison",
-        "{\"type\":\"object\",\"required\":[\"scene\",\"request\",\"device\",\"warnings\","
-        "\"reference\",\"methods\"],\"properties\":{\"request_id\":{\"type\":\"string\"},\"scene\":"
-        "{\"$ref\":\"" SCHEMA "Id\"},\"request\":{\"$ref\":\"" SCHEMA
-        "RenderRequest\"},\"device\":{\"type\":\"object\"},\"warnings\":{\"type\":\"array\","
-        "\"items\":{\"type\":\"string\"}},\"reference\":{\"$ref\":\"" SCHEMA
-        "ComparedMethod\"},\"methods\":{\"type\":\"array\",\"items\":{\"$ref\":\"" SCHEMA
-        "ComparedMethod\"}},\"total_ms\":{\"type\":\"number\"}}}"},
-    {"Record",
-        "{\"type\":\"object\",\"description\":\"How an image was made.\",\"required\":[\"scene\","
-        "\"request\",\"warnings\",\"device\"],\"properties\":{\"request_id\":{\"type\":\"string\"},"
-        "\"scene\":{\"$ref\":\"" SCHEMA "Id\"},\"request\":{\"$ref\":\"" SCHEMA "RenderRequest\"},"
-        "\"image\":{\"type\":\"object\",\"properties\":{\"href\":{\"type\":\"string\"},\"etag\":"
-        "{\"type\":\"string\"},\"type\":{\"type\":\"string\"},\"width\":{\"type\":\"integer\"},"
-        "\"height\":{\"type\":\"integer\"},\"bytes\":{\"type\":\"integer\"}}},\"warnings\":{"
-        "\"type\":"
-        "\"array\",\"items\":{\"type\":\"string\"}},\"choice\":{\"type\":\"string\","
-        "\"description\":\"Why this method, when auto was asked "
-        "for.\"},\"device\":{\"type\":\"object\",\"properties\":"
-        "{\"renderer\":{\"type\":\"string\"},\"version\":{\"type\":\"string\"},\"platform\":{"
-        "\"type\":"
-        "\"string\"},\"software\":{\"type\":\"boolean\"}}},\"cache\":{\"type\":\"object\","
-        "\"properties\":{\"result\":{\"type\":\"boolean\"},\"scene_resident\":{\"type\":"
-        "\"boolean\"},"
-        "\"shadow_inputs_reused\":{\"type\":\"boolean\"}}},\"total_ms\":{\"type\":\"number\"},"
-        "\"stages_ms\":{\"type\":\"object\",\"additionalProperties\":{\"type\":\"number\"}},"
-        "\"passes\":{\"type\":\"array\",\"items\":{\"type\":\"object\",\"properties\":{\"name\":"
-        "{\"type\":\"string\"},\"stage\":{\"type\":\"string\"},\"count\":{\"type\":\"integer\"},"
-        "\"ms\":{\"type\":\"number\"}}}},\"pixels\":{\"type\":\"object\",\"additionalProperties\":"
-        "{\"type\":\"integer\"}},\"triangles_drawn\":{\"type\":\"integer\"},\"rays\":{\"type\":"
-        "\"integer\"},\"gpu_bytes\":{"
-        "\"type\":"
-        "\"integer\"}}}"},
-};
+static void write_stage_times(struct pen_json *json, const struct pen_catalogue *catalogue)
+{
+    (void)catalogue;
+    pen_json_object(json, "StageTimes");
+    pen_json_string(json, "type", "object");
+    pen_json_string(json, "description", "Milliseconds per stage.");
+    write_strings(json, "required", pen_stage_names);
+    pen_json_object(json, "properties");
+    for (uint32_t s = 0; s < PEN_STAGES; s++)
+        pen_json_raw(json, pen_stage_names[s], "{\"type\":[\"number\",\"null\"],\"minimum\":0}");
+    pen_json_end(json);
+    pen_json_end(json);
+}
+
+/* The files of the written ones: a missing one does not assemble. */
+#define DERIVED(name, writer)
+#define WRITTEN(name)                                                                              \
+    __asm__(".section .rodata\nschema_" #name ": .incbin \"" SCHEMAS_FOLDER "/" #name              \
+            ".json\"\n.byte 0\n.previous");                                                        \
+    extern const char schema_##name[];
+#include "protocol/schemas.def"
+#undef WRITTEN
+#undef DERIVED
 
 void pen_openapi_schemas(struct pen_json *json, const struct pen_catalogue *catalogue)
 {
-    write_request(json);
-    write_compare(json);
-    write_techniques(json, catalogue);
-    write_camera(json);
-    write_light(json);
-    write_texture(json);
-    for (uint32_t i = 0; i < sizeof answers / sizeof *answers; i++)
-        pen_json_raw(json, answers[i][0], answers[i][1]);
+#define DERIVED(name, writer) writer(json, catalogue);
+#define WRITTEN(name) pen_json_raw(json, #name, schema_##name);
+#include "protocol/schemas.def"
 }

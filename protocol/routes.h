@@ -1,58 +1,38 @@
-/* The calls of the public listener, one row each: the front end routes by them and the OpenAPI
- * document lists them. */
+/* The calls of the public listener, as endpoints.def lists them. */
 #pragma once
 #include "protocol/limits.h"
 #include <stdbool.h>
 #include <stdint.h>
 
 enum pen_route_id {
-    PEN_ROUTE_SERVICE,      /* GET /v1 */
-    PEN_ROUTE_OPENAPI,      /* GET /openapi.json */
-    PEN_ROUTE_TECHNIQUES,   /* GET /v1/techniques */
-    PEN_ROUTE_TECHNIQUE,    /* GET /v1/techniques/{name} */
-    PEN_ROUTE_SCENES,       /* GET /v1/scenes */
-    PEN_ROUTE_SCENE_POST,   /* POST /v1/scenes */
-    PEN_ROUTE_SCENE,        /* GET /v1/scenes/{id} */
-    PEN_ROUTE_SCENE_PUT,    /* PUT /v1/scenes/{id} */
-    PEN_ROUTE_SCENE_DELETE, /* DELETE /v1/scenes/{id} */
-    PEN_ROUTE_RENDER,       /* GET /v1/scenes/{id}/render */
-    PEN_ROUTE_RENDER_POST,  /* POST /v1/scenes/{id}/render */
-    PEN_ROUTE_COMPARE,      /* POST /v1/scenes/{id}/compare */
-    PEN_ROUTE_IMAGES,       /* GET /v1/images */
-    PEN_ROUTE_IMAGE_POST,   /* POST /v1/images */
-    PEN_ROUTE_IMAGE,        /* GET /v1/images/{id} */
-    PEN_ROUTE_IMAGE_PUT,    /* PUT /v1/images/{id} */
-    PEN_ROUTE_IMAGE_DELETE, /* DELETE /v1/images/{id} */
-    PEN_ROUTE_STATS,        /* GET /v1/stats */
-    PEN_ROUTE_RESULT,       /* GET /v1/results/{id} */
+#define ENDPOINT(id, ...) PEN_ROUTE_##id,
+#include "protocol/endpoints.def"
+#undef ENDPOINT
     PEN_ROUTES
 };
 
-/* What a body holds. */
+/* What a body holds: one of the documents in schemas.def, or something else. */
 enum pen_body {
     PEN_BODY_NONE,
-    PEN_BODY_REQUEST,      /* a render request */
-    PEN_BODY_COMPARE,      /* what to compare */
-    PEN_BODY_SCENE_UPLOAD, /* model/gltf-binary, multipart/form-data, application/zip */
-    PEN_BODY_IMAGE_UPLOAD, /* image/png, image/jpeg, image/webp */
-    PEN_BODY_IMAGE,        /* a rendered image, or the record when JSON is accepted */
-    PEN_BODY_SERVICE,
-    PEN_BODY_OPENAPI,
-    PEN_BODY_TECHNIQUES,
-    PEN_BODY_TECHNIQUE,
-    PEN_BODY_SCENES,
-    PEN_BODY_SCENE,
-    PEN_BODY_IMAGES,
-    PEN_BODY_IMAGE_INFO,
-    PEN_BODY_STATS,
-    PEN_BODY_COMPARISON,
+#define DERIVED(name, writer) PEN_BODY_##name,
+#define WRITTEN(name) PEN_BODY_##name,
+#include "protocol/schemas.def"
+#undef WRITTEN
+#undef DERIVED
+    PEN_BODY_SCENE_UPLOAD,
+    PEN_BODY_IMAGE_UPLOAD,
+    PEN_BODY_PICTURE, /* a rendered image, or the record when JSON is accepted */
+    PEN_BODY_PAGE,    /* HTML */
 };
+/* The media types of an upload, ended by NULL; NULL: the body is no upload. */
+const char *const *pen_upload_types(enum pen_body body);
 
 enum pen_route_flags {
     PEN_ROUTE_CREATES = 1,     /* 201 for something new, 200 for what is there already */
     PEN_ROUTE_QUERY = 2,       /* takes the render request as a query string */
     PEN_ROUTE_PAGED = 4,       /* takes limit and after */
     PEN_ROUTE_CONDITIONAL = 8, /* ETag and If-None-Match */
+    PEN_ROUTE_OPEN = 16,       /* asks for no token */
 };
 
 struct pen_route {
@@ -68,9 +48,9 @@ extern const struct pen_route pen_routes[PEN_ROUTES];
 
 struct pen_route_match {
     const struct pen_route *route;       /* NULL: none */
-    char id[PEN_ID_HEX + 1];             /* what stood for {id}, or "" */
+    uint8_t id[PEN_ID_BYTES];            /* what stood for {id} */
     char name[PEN_TECHNIQUE_NAME_BYTES]; /* what stood for {name}, or "" */
-    uint32_t methods;                    /* bit r: row r has this path, whatever its method */
+    uint64_t methods;                    /* bit r: row r has this path, whatever its method */
 };
 
 /* Finds the row for a method and a decoded path without its query, token by token; nothing is
@@ -78,4 +58,4 @@ struct pen_route_match {
  * When it is not, match->methods says whether the path exists (405, Allow) or not (404). */
 bool pen_route_find(const char *method, const char *path, struct pen_route_match *match);
 /* "GET, HEAD, POST": the Allow header for match->methods. */
-void pen_route_allow(uint32_t methods, char *text, uint32_t bytes);
+void pen_route_allow(uint64_t methods, char *text, uint32_t bytes);

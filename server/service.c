@@ -21,36 +21,6 @@
 #define STRAGGLER_MS 200 /* requests on their way when the last answer is out */
 #define CANCEL_MS 10000
 
-bool service_is_draining(const struct service *s)
-{
-    return __atomic_load_n(&s->draining, __ATOMIC_ACQUIRE);
-}
-
-bool service_device(struct service *s, struct pen_device_info *device)
-{
-    struct worker_pool_numbers numbers;
-    worker_pool_read(s->pool, &numbers);
-    *device = numbers.device;
-    return numbers.has_device;
-}
-
-const char *service_obstacle(struct service *s)
-{
-    struct worker_pool_numbers pool;
-    struct scheduler_numbers queue;
-    worker_pool_read(s->pool, &pool);
-    scheduler_read(s->scheduler, &queue);
-    if (service_is_draining(s))
-        return "The service is shutting down.";
-    if (!pool.warmed)
-        return "The worker is still warming up.";
-    if (!pool.up)
-        return "No worker is up.";
-    if (queue.full)
-        return "The queue is full.";
-    return NULL;
-}
-
 /* ---- what the pool asks for ---- */
 
 static bool open_job(
@@ -281,7 +251,6 @@ struct service *service_create(
     struct service *s = pen_alloc_zero(1, sizeof *s);
     s->config = config;
     s->catalogue = catalogue = auto_catalogue(catalogue);
-    s->auto_runs = auto_runs_create();
     s->started_ns = clock_now_ns();
     s->canary_blob = -1;
     pthread_mutex_init(&s->canary_lock, NULL);
@@ -312,6 +281,7 @@ struct service *service_create(
     s->metrics = metrics_create(catalogue);
     s->cache = result_cache_create(config->result_cache.bytes);
     s->scheduler = scheduler_create(&limits, on_work, s);
+    s->auto_runs = auto_runs_create(&(struct auto_parts){s->scheduler, s->store, catalogue});
     if (!start_importer(s, error) || !start_pool(s, error) || !start_listeners(s, error))
         goto fail;
     return s;

@@ -1,45 +1,6 @@
-/* The parts of the running daemon, and what ties them together. */
+/* The life of the daemon's parts. */
 #pragma once
-#include "protocol/technique_info.h"
-#include "server/http/auth.h"
-#include "server/auto/render.h"
-#include "server/base/config.h"
-#include "server/http/http.h"
-#include "server/store/importer.h"
-#include "server/base/metrics.h"
-#include "server/store/result_cache.h"
-#include "server/store/scene_store.h"
-#include "server/queue/scheduler.h"
-#include "server/workers/worker_pool.h"
-#include <pthread.h>
-
-struct service {
-    /* Constant after service_create. */
-    const struct config *config;
-    const struct pen_catalogue *catalogue;
-    struct scene_store *store;
-    struct importer *importer;
-    struct scheduler *scheduler;
-    struct worker_pool *pool;
-    struct result_cache *cache;
-    struct metrics *metrics;
-    struct auto_runs *auto_runs;
-    struct auth *auth; /* NULL: no token is asked for */
-    struct http_listener *listener, *admin;
-    char *openapi, openapi_tag[PEN_ID_HEX + 1];
-    char *cert_pem, *key_pem;
-    uint64_t started_ns;
-    int canary_blob; /* a plane, as a blob in a memfd */
-    uint8_t canary_id[PEN_ID_BYTES];
-
-    bool draining;                       /* atomic */
-    uint32_t uploads;                    /* atomic: under way */
-    uint64_t bytes_received, bytes_sent; /* atomic, public listener */
-
-    pthread_mutex_t canary_lock; /* guards the two below */
-    uint64_t canary_ns;          /* when the canary was last rendered; 0: never */
-    bool canary_failed;
-};
+#include "server/routes/context.h"
 
 /* Opens the store, starts the workers and the listeners. Errors: what the parts say. */
 struct service *service_create(
@@ -47,10 +8,3 @@ struct service *service_create(
 /* Answers every accepted request, within the drain timeout or until `hurry` (atomic) is set, and
  * stops everything. */
 void service_destroy(struct service *service, const bool *hurry);
-
-bool service_is_draining(const struct service *service);
-/* Why it is not ready (a constant sentence), or NULL: it is, as far as can be told without
- * a test render. */
-const char *service_obstacle(struct service *service);
-/* The device, once a worker has told. */
-bool service_device(struct service *service, struct pen_device_info *device);

@@ -1,12 +1,11 @@
 #include "server/auto/render.h"
 #include "protocol/memory.h"
-#include "server/auto/history.h"
 #include "server/auto/calibration.h"
 #include "server/base/clock.h"
 #include "server/queue/compare.h"
 #include "server/base/log.h"
-#include "server/routes/routes.h"
 #include <math.h>
+#include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -25,31 +24,33 @@
 #define PROBE_SCALE 4
 #define MAX_STEPS (1 + AUTO_MAX_ROWS * STEPS + PROBES)
 
-/* One scene and view being measured, and the calls that wait for it. */
+/* One scene and view being measured, and the renders that wait for it. */
 struct run {
     struct run *next;
-    struct service *service;
+    struct auto_runs *runs;
     struct pen_device_info device;
     uint8_t scene[PEN_ID_BYTES];
     struct auto_table table;
-    struct call *waiting;                 /* guarded by auto_runs.lock */
+    struct auto_render *waiting;          /* guarded by auto_runs.lock */
     uint32_t steps, probes, probe_pixels; /* probes: the first of them; none: steps */
     struct pen_request requests[MAX_STEPS];
     uint32_t measures[MAX_STEPS];
 };
 
 struct auto_runs {
-    pthread_mutex_t lock; /* guards the runs and their calls */
+    struct auto_parts parts; /* constant */
+    pthread_mutex_t lock;    /* guards the runs and the renders that wait */
     struct run *first;
     pthread_mutex_t saving; /* held while the store's tables are written */
     struct auto_history *history;
 };
 
-struct auto_runs *auto_runs_create(void)
+struct auto_runs *auto_runs_create(const struct auto_parts *parts)
 {
     struct auto_runs *runs = pen_alloc_zero(1, sizeof *runs);
     pthread_mutex_init(&runs->lock, NULL);
     pthread_mutex_init(&runs->saving, NULL);
+    runs->parts = *parts;
     runs->history = auto_history_create();
     return runs;
 }
@@ -64,42 +65,40 @@ void auto_runs_destroy(struct auto_runs *runs)
     free(runs);
 }
 
-void auto_runs_observe(struct auto_runs *runs, const struct call *call, double ms)
+void auto_runs_observe(struct auto_runs *runs, const struct auto_render *render, double ms)
 {
-    auto_history_add(runs->history, &call->expected, ms);
+    auto_history_add(runs->history, &render->expected, ms);
 }
 
 /* ---- choosing ---- */
 
-/* Takes a method from the table and serves the call. */
-static void serve(struct call *call, const struct auto_table *measured)
+/* Takes a method from the table. */
+static bool take(struct auto_runs *runs, struct auto_render *render,
+    const struct auto_table *measured, struct pen_error *error)
 {
     struct auto_table corrected = *measured, *table = &corrected;
     struct auto_expected expected[AUTO_MAX_ROWS];
     double factors[AUTO_MAX_ROWS];
     struct auto_wish wish;
     struct auto_pick pick;
-    struct pen_error error = {0};
-    const struct pen_request *request = &call->request;
+    struct pen_request *request = render->request;
     for (uint32_t i = 0; i < table->count; i++) { /* times as other renders have borne them out */
         auto_history_name(
             table->cost, table->rows[i].key, request->width, request->height, &expected[i]);
-        factors[i] = auto_history_factor(call->service->auto_runs->history, &expected[i]);
+        factors[i] = auto_history_factor(runs->history, &expected[i]);
         table->rows[i].fixed_ms *= factors[i];
         table->rows[i].screen_ms *= factors[i];
     }
     memcpy(&wish, request->technique_params, sizeof wish);
-    if (!auto_choose(table, &wish, (uint64_t)request->width * request->height, &pick)) {
-        pen_fail(&error, PEN_INTERNAL, "/technique", "No method could be measured on this scene.");
-        routes_fail(call, &error);
-        return;
-    }
-    auto_apply(auto_find(pick.row->key), call->service->catalogue, &call->request);
-    snprintf(call->choice, sizeof call->choice, "%s", pick.why);
-    call->choice_met = pick.met;
-    call->expected = expected[pick.row - table->rows];
-    call->expected.ms = pick.predicted_ms / factors[pick.row - table->rows];
-    routes_serve(call);
+    if (!auto_choose(table, &wish, (uint64_t)request->width * request->height, &pick))
+        return pen_fail(
+            error, PEN_INTERNAL, "/technique", "No method could be measured on this scene.");
+    auto_apply(auto_find(pick.row->key), runs->parts.catalogue, request);
+    snprintf(render->why, sizeof render->why, "%s", pick.why);
+    render->met = pick.met;
+    render->expected = expected[pick.row - table->rows];
+    render->expected.ms = pick.predicted_ms / factors[pick.row - table->rows];
+    return true;
 }
 
 /* ---- measuring ---- */
@@ -127,16 +126,16 @@ static void plan_probes(struct run *run, const struct pen_request *asked)
     if ((uint64_t)asked->width * asked->height <= run->table.pixels || !run->table.count)
         return;
     limit_pixels(&larger, PROBE_SCALE * run->table.pixels);
-    auto_apply(auto_find(run->table.rows[0].key), run->service->catalogue, &larger);
+    auto_apply(auto_find(run->table.rows[0].key), run->runs->parts.catalogue, &larger);
     run->probe_pixels = larger.width * larger.height;
     for (int k = 0; k < PROBES; k++)
-        add_step(run, &larger, CHANNEL_PICTURE);
+        add_step(run, &larger, MEASURE_PICTURE);
 }
 
 /* The reference, then every candidate: its error, and its time a few times; then the probes. */
 static void plan_steps(struct run *run, const struct pen_request *asked)
 {
-    const struct pen_catalogue *catalogue = run->service->catalogue;
+    const struct pen_catalogue *catalogue = run->runs->parts.catalogue;
     bool software = run->device.software, textured = false;
     struct pen_request small = *asked, timed = *asked;
     const char *name = pen_catalogue_find(catalogue, "raytraced") ? "raytraced" : "multisample";
@@ -148,7 +147,7 @@ static void plan_steps(struct run *run, const struct pen_request *asked)
     small.output.layer = PEN_LAYER_BEAUTY;
     small.output.bit_depth = 0;
     auto_apply(&reference, catalogue, &small);
-    add_step(run, &small, CHANNEL_REFERENCE);
+    add_step(run, &small, MEASURE_REFERENCE);
     for (uint32_t i = 0; i < asked->light_count; i++)
         textured |= asked->lights[i].texture != PEN_TEXTURE_NONE;
     for (uint32_t i = 0; i < auto_candidate_count && run->table.count < AUTO_MAX_ROWS; i++) {
@@ -159,9 +158,9 @@ static void plan_steps(struct run *run, const struct pen_request *asked)
         auto_apply(candidate, catalogue, &small);
         auto_apply(candidate, catalogue, &timed);
         for (int k = 0; k < COLD; k++)
-            add_step(run, &small, CHANNEL_NUMBERS);
+            add_step(run, &small, MEASURE_NUMBERS);
         for (int k = 0; k < REPEATS; k++)
-            add_step(run, &timed, CHANNEL_PICTURE);
+            add_step(run, &timed, MEASURE_PICTURE);
     }
     run->probes = run->steps;
     plan_probes(run, asked);
@@ -252,32 +251,31 @@ static void read_rows(struct run *run, const struct compare_row *steps)
     }
 }
 
-/* Answers 504 to the calls whose time is up; the run goes on for the next ones. */
-static void expire_calls(struct run *run)
+/* Ends the renders whose time is up; the run goes on for the next ones. */
+static void expire(struct run *run)
 {
-    struct auto_runs *runs = run->service->auto_runs;
-    struct call *late = NULL;
+    struct auto_runs *runs = run->runs;
+    struct auto_render *late = NULL;
     struct pen_error error = {0};
     uint64_t now = clock_now_ns();
     pthread_mutex_lock(&runs->lock);
-    for (struct call **at = &run->waiting; *at;) {
-        struct call *call = *at;
-        uint64_t deadline = call->exchange->body_ns + call->request.delivery.deadline_ms * CLOCK_MS;
-        if (deadline > now) {
-            at = &call->next_waiting;
+    for (struct auto_render **at = &run->waiting; *at;) {
+        struct auto_render *render = *at;
+        if (render->deadline_ns > now) {
+            at = &render->next;
             continue;
         }
-        *at = call->next_waiting;
-        call->next_waiting = late;
-        late = call;
+        *at = render->next;
+        render->next = late;
+        late = render;
     }
     pthread_mutex_unlock(&runs->lock);
     pen_fail(&error, PEN_DEADLINE, "/deadline_ms",
         "The scene is still being measured: ask again, or allow more time.");
     while (late) {
-        struct call *call = late;
-        late = call->next_waiting;
-        routes_fail(call, &error);
+        struct auto_render *render = late;
+        late = render->next;
+        render->chosen(render, &error);
     }
 }
 
@@ -287,7 +285,7 @@ static bool wants(void *owner, struct compare *compare, uint32_t step)
     struct run *run = owner;
     const struct compare_row *rows = compare_rows(compare);
     uint32_t repeat = (step - 1) % STEPS, first = step - repeat;
-    expire_calls(run);
+    expire(run);
     if (step >= run->probes)
         return true;
     if (repeat && rows[first].result.error.code != PEN_OK)
@@ -297,15 +295,15 @@ static bool wants(void *owner, struct compare *compare, uint32_t step)
     return repeat < COLD + 2 || rows[first + COLD].run_ms < SLOW_MS;
 }
 
-/* A scene that was deleted meanwhile has no place for it; its callers are answered all the same. */
+/* A scene that was deleted meanwhile has no place for it; those who wait are served all the same. */
 static void save(struct run *run)
 {
-    struct service *s = run->service;
+    struct auto_runs *runs = run->runs;
     if (!run->table.count)
         return;
-    pthread_mutex_lock(&s->auto_runs->saving);
-    bool ok = calibration_save(s->store, run->scene, &run->device, &run->table);
-    pthread_mutex_unlock(&s->auto_runs->saving);
+    pthread_mutex_lock(&runs->saving);
+    bool ok = calibration_save(runs->parts.store, run->scene, &run->device, &run->table);
+    pthread_mutex_unlock(&runs->saving);
     if (!ok)
         log_event(LOG_ERROR, "a calibration could not be written to the store");
 }
@@ -314,28 +312,26 @@ static void save(struct run *run)
 static void done(void *owner, struct compare *compare, const struct pen_error *error)
 {
     struct run *run = owner;
-    struct service *s = run->service;
-    struct auto_runs *runs = s->auto_runs;
+    struct auto_runs *runs = run->runs;
     if (error->code == PEN_OK) {
         read_rows(run, compare_rows(compare));
         save(run);
     }
-    if (compare)
-        compare_destroy(compare);
+    compare_destroy(compare);
     pthread_mutex_lock(&runs->lock);
     struct run **at = &runs->first;
     while (*at != run)
         at = &(*at)->next;
     *at = run->next;
     pthread_mutex_unlock(&runs->lock);
-    expire_calls(run);
+    expire(run);
     while (run->waiting) { /* nobody can join any more */
-        struct call *call = run->waiting;
-        run->waiting = call->next_waiting;
-        if (error->code == PEN_OK)
-            serve(call, &run->table);
-        else
-            routes_fail(call, error);
+        struct auto_render *render = run->waiting;
+        struct pen_error own = *error;
+        run->waiting = render->next;
+        if (own.code == PEN_OK)
+            take(runs, render, &run->table, &own);
+        render->chosen(render, &own);
     }
     free(run);
 }
@@ -350,75 +346,69 @@ static void start(struct run *run)
         .done = done,
         .owner = run};
     struct pen_error error = {0};
-    if (compare_start(run->service->scheduler, &plan, &error))
+    if (compare_start(run->runs->parts.scheduler, &plan, &error))
         return;
     done(run, NULL, &error);
 }
 
-/* Waits for a run that measures this view, or starts one. `wanted`: setup and cost. */
-static void wait_for_run(
-    struct call *call, const struct pen_device_info *device, const struct auto_table *wanted)
+/* What the request's measurements are filed under. */
+static void name_setup(const struct auto_render *render, struct auto_table *table)
 {
-    struct service *s = call->service;
-    struct auto_runs *runs = s->auto_runs;
-    struct pen_error error = {0};
+    memset(table, 0, sizeof *table);
+    calibration_setup(render->request, table->setup, table->cost);
+}
+
+bool auto_runs_recall(struct auto_runs *runs, const struct pen_device_info *device,
+    struct auto_render *render, struct pen_error *error)
+{
+    struct auto_wish wish;
+    struct auto_table table;
+    memcpy(&wish, render->request->technique_params, sizeof wish);
+    name_setup(render, &table);
+    /* An error is known only of a view that was measured; a time nearly holds for others too. */
+    bool any = wish.budget_ms > 0 && !(wish.max_rmse > 0);
+    return calibration_load(runs->parts.store, render->request->scene, device, any, &table) &&
+           take(runs, render, &table, error);
+}
+
+bool auto_runs_measure(struct auto_runs *runs, const struct pen_device_info *device,
+    struct auto_render *render, struct pen_error *error)
+{
+    struct auto_table wanted;
     struct run *fresh = pen_alloc_zero(1, sizeof *fresh);
-    call->is_deferred = true;
-    http_defer(call->exchange);
+    name_setup(render, &wanted);
     pthread_mutex_lock(&runs->lock);
     struct run *run = runs->first;
     uint32_t count = 0;
-    while (run && (memcmp(run->scene, call->id, PEN_ID_BYTES) ||
-                      memcmp(run->table.setup, wanted->setup, PEN_ID_BYTES))) {
+    while (run && (memcmp(run->scene, render->request->scene, PEN_ID_BYTES) ||
+                      memcmp(run->table.setup, wanted.setup, PEN_ID_BYTES))) {
         run = run->next;
         count++;
     }
     bool full = !run && count >= MAX_RUNS;
-    if (full) {
-        pthread_mutex_unlock(&runs->lock);
-        free(fresh);
-        pen_fail(&error, PEN_UNAVAILABLE, "", "%d scenes are being measured already.", MAX_RUNS);
-        error.retry_after_s = 2;
-        routes_fail(call, &error);
-        return;
-    }
-    if (!run) {
+    bool starts = !run && !full;
+    if (starts) {
         run = fresh;
-        run->service = s;
+        run->runs = runs;
         run->device = *device;
-        memcpy(run->scene, call->id, PEN_ID_BYTES);
-        run->table = *wanted;
-        plan_steps(run, &call->request);
+        memcpy(run->scene, render->request->scene, PEN_ID_BYTES);
+        run->table = wanted;
+        plan_steps(run, render->request);
         run->next = runs->first;
         runs->first = run;
     }
-    call->next_waiting = run->waiting;
-    run->waiting = call;
+    if (!full) {
+        render->next = run->waiting;
+        run->waiting = render;
+    }
     pthread_mutex_unlock(&runs->lock);
-    if (run == fresh)
+    if (starts)
         start(run);
     else
         free(fresh);
-}
-
-void routes_auto(struct call *call)
-{
-    struct service *s = call->service;
-    struct pen_device_info device;
-    struct auto_wish wish;
-    struct auto_table table = {0};
-    struct pen_error error = {0};
-    if (!service_device(s, &device)) {
-        pen_fail(&error, PEN_UNAVAILABLE, "", "The worker is still starting.");
-        routes_fail(call, &error);
-        return;
-    }
-    memcpy(&wish, call->request.technique_params, sizeof wish);
-    calibration_setup(&call->request, table.setup, table.cost);
-    /* An error is known only of a view that was measured; a time nearly holds for others too. */
-    bool any = wish.budget_ms > 0 && !(wish.max_rmse > 0);
-    if (calibration_load(s->store, call->id, &device, any, &table))
-        serve(call, &table);
-    else
-        wait_for_run(call, &device, &table);
+    if (!full)
+        return true;
+    pen_fail(error, PEN_UNAVAILABLE, "", "%d scenes are being measured already.", MAX_RUNS);
+    error->retry_after_s = 2;
+    return false;
 }

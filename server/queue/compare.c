@@ -1,6 +1,5 @@
 #include "server/queue/compare.h"
 #include "protocol/memory.h"
-#include "server/workers/channel.h"
 #include "server/base/clock.h"
 #include <fcntl.h>
 #include <stdlib.h>
@@ -31,9 +30,9 @@ static bool submit(struct compare *c, struct pen_error *error)
     c->waiter.deadline_ns =
         c->plan.deadline_ns ? c->plan.deadline_ns : clock_now_ns() + c->plan.patience_ms * CLOCK_MS;
     c->waiter.measure = c->plan.measures ? c->plan.measures[c->at]
-                        : c->at          ? CHANNEL_COMPARED
-                                         : CHANNEL_REFERENCE;
-    c->waiter.reference_fd = channel_has_reference(c->waiter.measure) ? c->planes_fd : 0;
+                        : c->at          ? MEASURE_COMPARED
+                                         : MEASURE_REFERENCE;
+    c->waiter.reference_fd = measure_has_reference(c->waiter.measure) ? c->planes_fd : 0;
     return scheduler_submit(c->scheduler, request, key, false, &c->waiter, error);
 }
 
@@ -51,9 +50,9 @@ static void take(struct compare *c, const struct outcome *outcome)
         row->result = *outcome->result;
     row->result.error = outcome->error;
     row->run_ms = outcome->run_ms;
-    if (outcome->picture && c->waiter.measure != CHANNEL_PICTURE)
+    if (outcome->picture && c->waiter.measure != MEASURE_PICTURE)
         row->image = picture_reference(outcome->picture);
-    for (int m = 0; m < CHANNEL_MAPS; m++)
+    for (int m = 0; m < MEASURE_MAPS; m++)
         if (outcome->maps[m])
             row->maps[m] = picture_reference(outcome->maps[m]);
     if (outcome->planes_fd > 0)
@@ -106,9 +105,11 @@ uint32_t compare_done_count(const struct compare *c)
 
 void compare_destroy(struct compare *c)
 {
+    if (!c)
+        return;
     for (uint32_t i = 0; i < c->plan.count; i++) {
         picture_release(c->rows[i].image);
-        for (int m = 0; m < CHANNEL_MAPS; m++)
+        for (int m = 0; m < MEASURE_MAPS; m++)
             picture_release(c->rows[i].maps[m]);
     }
     if (c->planes_fd > 0)

@@ -8,10 +8,10 @@ struct compare;
 struct compare_plan {
     const struct pen_request *requests; /* [0] is the reference */
     uint32_t count;                     /* with the reference */
-    const uint32_t *measures; /* enum channel_measure, one per request, the first a reference;
-                                 NULL: the others are CHANNEL_COMPARED */
-    uint64_t client;          /* whose share it uses, as one render; 0: nobody's */
-    uint64_t deadline_ns;     /* of all together; 0: patience_ms for each */
+    const uint32_t *measures;           /* enum measure, one per request, the first a reference;
+                                 NULL: the others are MEASURE_COMPARED */
+    uint64_t client;                    /* whose share it uses, as one render; 0: nobody's */
+    uint64_t deadline_ns;               /* of all together; 0: patience_ms for each */
     uint32_t patience_ms;
     /* Called before every request but the first; false leaves it out. May be NULL. */
     bool (*wants)(void *owner, struct compare *compare, uint32_t request);
@@ -23,9 +23,9 @@ struct compare_plan {
 };
 
 struct compare_row {
-    struct pen_result result;        /* error.code set: this one could not be rendered */
-    struct picture *image, *maps[3]; /* of measurements */
-    double run_ms;                   /* on the worker; 0: left out */
+    struct pen_result result;                   /* error.code set: this one could not be rendered */
+    struct picture *image, *maps[MEASURE_MAPS]; /* of measurements */
+    double run_ms;                              /* on the worker; 0: left out */
 };
 
 /* One measurement after the other, so that none disturbs the times of another. They go through the
@@ -37,4 +37,4 @@ bool compare_start(
 const struct compare_row *compare_rows(const struct compare *compare);
 /* How many requests were through when it ended. */
 uint32_t compare_done_count(const struct compare *compare);
-void compare_destroy(struct compare *compare);
+void compare_destroy(struct compare *compare); /* NULL is fine */

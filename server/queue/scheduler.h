@@ -2,6 +2,7 @@
  * that asks for the same picture at the same time waits on the same render. */
 #pragma once
 #include "protocol/request.h"
+#include "server/queue/measure.h"
 #include "server/store/picture.h"
 
 /* How a render ended for one client. */
@@ -11,9 +12,9 @@ struct outcome {
     double queue_ms, run_ms; /* before and after a worker took it */
     bool shared;             /* another client's request rendered it */
     /* Of measurements, borrowed like the picture: */
-    const struct pen_result *result; /* also when nothing was encoded */
-    int planes_fd;                   /* of a reference; 0: none */
-    struct picture *maps[3];         /* enum channel_map; NULL: none */
+    const struct pen_result *result;    /* also when nothing was encoded */
+    int planes_fd;                      /* of a reference; 0: none */
+    struct picture *maps[MEASURE_MAPS]; /* enum measure_map; NULL: none */
 };
 
 /* One client waiting. The owner keeps it alive from a successful scheduler_submit until `finish`,
@@ -24,7 +25,7 @@ struct waiter {
     uint64_t client;                        /* whose share it uses; 0: nobody's */
     bool (*is_gone)(struct waiter *waiter); /* the client has hung up; may be NULL */
     void (*finish)(struct waiter *waiter, const struct outcome *outcome);
-    uint32_t measure; /* enum channel_measure; what is measured is never shared */
+    uint32_t measure; /* enum measure; what is measured is never shared */
     int reference_fd; /* planes to compare with, needed until scheduler_submit returns; 0: none */
 };
 

@@ -27,6 +27,25 @@ static void answer_text(struct http_exchange *x, uint32_t status, const char *te
 
 /* ---- readiness ---- */
 
+/* Why it is not ready (a constant sentence), or NULL: it is, as far as can be told without a test
+ * render. */
+static const char *obstacle_of(struct service *s)
+{
+    struct worker_pool_numbers pool;
+    struct scheduler_numbers queue;
+    worker_pool_read(s->pool, &pool);
+    scheduler_read(s->scheduler, &queue);
+    if (service_is_draining(s))
+        return "The service is shutting down.";
+    if (!pool.warmed)
+        return "The worker is still warming up.";
+    if (!pool.up)
+        return "No worker is up.";
+    if (queue.full)
+        return "The queue is full.";
+    return NULL;
+}
+
 static void finish_canary(struct waiter *waiter, const struct outcome *outcome)
 {
     struct probe *probe = (struct probe *)waiter;
@@ -44,7 +63,7 @@ static void finish_canary(struct waiter *waiter, const struct outcome *outcome)
 
 static void readyz(struct http_exchange *x, struct service *s)
 {
-    const char *obstacle = service_obstacle(s);
+    const char *obstacle = obstacle_of(s);
     if (obstacle) {
         answer_text(x, 503, obstacle);
         return;
@@ -61,9 +80,7 @@ static void readyz(struct http_exchange *x, struct service *s)
     struct pen_request request;
     struct pen_error error = {0};
     uint8_t key[PEN_ID_BYTES];
-    struct probe *probe = calloc(1, sizeof *probe);
-    if (!probe)
-        abort();
+    struct probe *probe = pen_alloc_zero(1, sizeof *probe);
     x->user = probe;
     probe->exchange = x;
     probe->service = s;
@@ -111,7 +128,7 @@ static void write_service(struct service *s, struct metrics_text *text)
     } rows[] = {
         {"penumbra_uptime_seconds", "gauge", "Since the start.",
             clock_ms(clock_now_ns() - s->started_ns) / 1e3},
-        {"penumbra_ready", "gauge", "1: takes renders.", service_obstacle(s) == NULL},
+        {"penumbra_ready", "gauge", "1: takes renders.", obstacle_of(s) == NULL},
         {"penumbra_draining", "gauge", "1: shutting down.", service_is_draining(s)},
         {"penumbra_workers_up", "gauge", "Workers that take jobs.", pool.up},
         {"penumbra_worker_restarts_total", "counter", "Workers that ended.", pool.restarts},
@@ -201,17 +218,25 @@ static void body(struct http_exchange *x, const void *data, size_t bytes)
     answer_text(x, 413, "This listener takes no bodies.\n");
 }
 
+static void livez(struct http_exchange *x, struct service *s)
+{
+    (void)s;
+    answer_text(x, 200, "live\n");
+}
+
+static const struct {
+    const char *path;
+    void (*handle)(struct http_exchange *x, struct service *s);
+} pages[] = {{"/livez", livez}, {"/readyz", readyz}, {"/metrics", metrics_page}};
+
 static void end(struct http_exchange *x)
 {
-    struct service *s = http_listener_context(x->listener);
-    if (!strcmp(x->path, "/livez"))
-        answer_text(x, 200, "live\n");
-    else if (!strcmp(x->path, "/readyz"))
-        readyz(x, s);
-    else if (!strcmp(x->path, "/metrics"))
-        metrics_page(x, s);
-    else
-        answer_text(x, 404, "There are /livez, /readyz and /metrics.\n");
+    for (size_t i = 0; i < sizeof pages / sizeof *pages; i++)
+        if (!strcmp(x->path, pages[i].path)) {
+            pages[i].handle(x, http_listener_context(x->listener));
+            return;
+        }
+    answer_text(x, 404, "There are /livez, /readyz and /metrics.\n");
 }
 
 static void completed(struct http_exchange *x)

@@ -1,15 +1,21 @@
 /* Methods against a reference. */
+#include "server/queue/compare.h"
 #include "protocol/json_compare.h"
 #include "protocol/memory.h"
 #include "server/auto/choice.h"
 #include "server/base/clock.h"
-#include "server/queue/compare.h"
 #include "server/routes/routes.h"
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #define LINK_BYTES (PEN_ID_HEX + 16)
+
+struct comparing {
+    struct pen_compare asked;
+    struct compare *compare; /* when it is done */
+    bool holds_share;
+};
 
 /* Keeps a picture and says where; NULL when there is none or it is too large to be kept. */
 static const char *keep(struct service *s, struct picture *picture, char link[LINK_BYTES])
@@ -20,48 +26,28 @@ static const char *keep(struct service *s, struct picture *picture, char link[LI
     return link;
 }
 
-static void answer(struct call *call, struct compare *compare)
+static enum step_end read_body(struct call *call, struct pen_error *error)
 {
-    struct service *s = call->service;
-    const struct compare_row *rows = compare_rows(compare);
-    uint32_t count = 1 + call->compare->count;
-    struct pen_compared *out = pen_alloc_zero(count, sizeof *out);
-    char(*links)[4][LINK_BYTES] = pen_alloc_zero(count, sizeof *links);
-    for (uint32_t i = 0; i < count; i++) {
-        out[i].result = &rows[i].result;
-        out[i].image = keep(s, rows[i].image, links[i][0]);
-        out[i].difference = keep(s, rows[i].maps[CHANNEL_DIFFERENCE], links[i][1]);
-        out[i].ssim_map = keep(s, rows[i].maps[CHANNEL_SSIM], links[i][2]);
-        out[i].flip_map = keep(s, rows[i].maps[CHANNEL_FLIP], links[i][3]);
-        for (int stage = PEN_STAGE_LOAD; stage < PEN_STAGES; stage++)
-            call->render_ms += rows[i].result.stage_ms[stage];
+    struct comparing *work = call->work;
+    size_t bytes;
+    const char *text = body_json(&call->body, &bytes);
+    if (call->exchange->query && *call->exchange->query) {
+        pen_fail(
+            error, PEN_MALFORMED, "", "A comparison is all in its body: there can be no query.");
+        return STEP_FAILED;
     }
-    double total_ms = clock_ms(clock_now_ns() - call->exchange->body_ns);
-    char *text =
-        pen_compare_json(call->compare, out, call->exchange->request_id, total_ms, s->catalogue);
-    free(links);
-    free(out);
-    http_add_header(call->exchange, "Cache-Control", "no-store");
-    routes_json(call, 200, text);
+    if (!pen_compare_from_json(
+            text, bytes, call->service->catalogue, AUTO_NAME, &work->asked, error))
+        return STEP_FAILED;
+    for (uint32_t i = 0; i <= work->asked.count; i++)
+        memcpy(work->asked.requests[i].scene, call->address.id, PEN_ID_BYTES);
+    return STEP_NEXT;
 }
 
-/* Any thread. */
-static void done(void *owner, struct compare *compare, const struct pen_error *error)
+static enum step_end look_up(struct call *call, struct pen_error *error)
 {
-    struct call *call = owner;
-    if (error->code == PEN_DEADLINE) {
-        struct pen_error late = {0};
-        pen_fail(&late, PEN_DEADLINE, "/deadline_ms",
-            "The comparison was not done in time: %u of %u images were. Allow more time, or "
-            "compare "
-            "fewer methods or smaller images.",
-            compare_done_count(compare), 1 + call->compare->count);
-        routes_fail(call, &late);
-    } else if (error->code != PEN_OK)
-        routes_fail(call, error);
-    else
-        answer(call, compare);
-    compare_destroy(compare);
+    const struct comparing *work = call->work;
+    return routes_check_store(call, &work->asked.requests[0], error) ? STEP_NEXT : STEP_FAILED;
 }
 
 static bool is_gone(void *owner)
@@ -69,44 +55,88 @@ static bool is_gone(void *owner)
     return http_client_is_gone(((struct call *)owner)->exchange);
 }
 
-static bool read_body(struct call *call, struct pen_error *error)
+/* Any thread. */
+static void done(void *owner, struct compare *compare, const struct pen_error *error)
 {
-    const char *text = call->text_bytes ? call->text : "{}";
-    if (call->exchange->query && *call->exchange->query)
-        return pen_fail(
-            error, PEN_MALFORMED, "", "A comparison is all in its body: there can be no query.");
-    call->compare = pen_alloc(1, sizeof *call->compare);
-    return pen_compare_from_json(text, call->text_bytes ? call->text_bytes : 2,
-        call->service->catalogue, AUTO_NAME, call->compare, error);
+    struct call *call = owner;
+    struct comparing *work = call->work;
+    struct pen_error late = {0};
+    work->compare = compare;
+    if (error->code == PEN_DEADLINE) {
+        pen_fail(&late, PEN_DEADLINE, "/deadline_ms",
+            "The comparison was not done in time: %u of %u images were. Allow more time, or "
+            "compare fewer methods or smaller images.",
+            compare_done_count(compare), 1 + work->asked.count);
+        error = &late;
+    }
+    call_resume(call, error);
 }
 
-void routes_compare(struct call *call)
+/* Waits for the last of the renders. */
+static enum step_end measure(struct call *call, struct pen_error *error)
 {
-    struct service *s = call->service;
-    struct pen_error error = {0};
-    if (!read_body(call, &error)) {
-        routes_fail(call, &error);
-        return;
-    }
-    struct pen_compare *compare = call->compare;
-    for (uint32_t i = 0; i <= compare->count; i++)
-        memcpy(compare->requests[i].scene, call->id, PEN_ID_BYTES);
-    call->request = compare->requests[0];
-    if (!routes_check_store(call, &error)) {
-        routes_fail(call, &error);
-        return;
-    }
-    struct compare_plan plan = {.requests = compare->requests,
-        .count = 1 + compare->count,
+    struct comparing *work = call->work;
+    const struct pen_request *first = &work->asked.requests[0];
+    struct compare_plan plan = {.requests = work->asked.requests,
+        .count = 1 + work->asked.count,
         .client = call->client,
-        .deadline_ns = call->exchange->body_ns + call->request.delivery.deadline_ms * CLOCK_MS,
+        .deadline_ns = call->exchange->body_ns + first->delivery.deadline_ms * CLOCK_MS,
         .is_gone = is_gone,
         .done = done,
         .owner = call};
-    call->holds_share = true; /* before another thread can complete the call */
+    work->holds_share = true; /* before another thread can complete the call */
     http_defer(call->exchange);
-    if (!compare_start(s->scheduler, &plan, &error)) {
-        call->holds_share = false;
-        routes_fail(call, &error);
+    if (compare_start(call->service->scheduler, &plan, error))
+        return STEP_OVER;
+    work->holds_share = false;
+    return STEP_FAILED;
+}
+
+static enum step_end answer(struct call *call, struct pen_error *error)
+{
+    (void)error;
+    struct service *s = call->service;
+    struct comparing *work = call->work;
+    const struct compare_row *rows = compare_rows(work->compare);
+    uint32_t count = 1 + work->asked.count;
+    struct pen_compared *out = pen_alloc_zero(count, sizeof *out);
+    char(*links)[4][LINK_BYTES] = pen_alloc_zero(count, sizeof *links);
+    for (uint32_t i = 0; i < count; i++) {
+        out[i].result = &rows[i].result;
+        out[i].image = keep(s, rows[i].image, links[i][0]);
+        out[i].difference = keep(s, rows[i].maps[MEASURE_MAP_DIFFERENCE], links[i][1]);
+        out[i].ssim_map = keep(s, rows[i].maps[MEASURE_MAP_SSIM], links[i][2]);
+        out[i].flip_map = keep(s, rows[i].maps[MEASURE_MAP_FLIP], links[i][3]);
+        for (int stage = PEN_STAGE_LOAD; stage < PEN_STAGES; stage++)
+            call->note.render_ms += rows[i].result.stage_ms[stage];
     }
+    double total_ms = clock_ms(clock_now_ns() - call->exchange->body_ns);
+    char *text =
+        pen_compare_json(&work->asked, out, call->exchange->request_id, total_ms, s->catalogue);
+    free(links);
+    free(out);
+    http_add_header(call->exchange, "Cache-Control", "no-store");
+    call_json(call, 200, text);
+    return STEP_OVER;
+}
+
+static void end_comparing(struct call *call, void *given)
+{
+    struct comparing *work = given;
+    if (work->holds_share)
+        scheduler_release(call->service->scheduler, call->client);
+    compare_destroy(work->compare);
+}
+
+static const struct step steps[] = {
+    {"read", read_body},
+    {"look up", look_up}, /* the scene, and the images of its lights */
+    {"measure", measure}, /* waits */
+    {"answer", answer},
+};
+
+bool route_compare(struct call *call, struct pen_error *error)
+{
+    call_work(call, sizeof(struct comparing), end_comparing);
+    return call_run(call, steps, error);
 }

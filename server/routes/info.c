@@ -6,70 +6,59 @@
 #include <stdlib.h>
 #include <string.h>
 
-static void answer_page(struct call *call, const char *text, size_t bytes)
+static bool answer_page(struct call *call, const char *text, size_t bytes)
 {
     http_add_header(call->exchange, "Content-Security-Policy",
         "default-src 'self'; style-src 'self' 'unsafe-inline'; script-src 'self' 'unsafe-inline'; "
         "img-src 'self' blob:; frame-ancestors 'none'; base-uri 'none'");
     http_add_header(call->exchange, "Cache-Control", "no-cache");
     http_answer(call->exchange, 200, "text/html; charset=utf-8", http_static(text, bytes));
+    return true;
 }
 
-void routes_home(struct call *call)
+bool route_home(struct call *call, struct pen_error *error)
 {
-    answer_page(call, page_home, (size_t)(page_home_end - page_home));
+    (void)error;
+    return answer_page(call, page_home, (size_t)(page_home_end - page_home));
 }
 
-void routes_docs(struct call *call)
+bool route_docs(struct call *call, struct pen_error *error)
 {
-    answer_page(call, page_docs, (size_t)(page_docs_end - page_docs));
+    (void)error;
+    return answer_page(call, page_docs, (size_t)(page_docs_end - page_docs));
 }
 
-void routes_openapi(struct call *call)
+bool route_openapi(struct call *call, struct pen_error *error)
 {
+    (void)error;
     const struct service *s = call->service;
     http_add_header(call->exchange, "Cache-Control", "no-cache");
-    if (!routes_not_modified(call, s->openapi_tag))
+    if (!call_not_modified(call, s->openapi_tag))
         http_answer(
             call->exchange, 200, "application/json", http_static(s->openapi, strlen(s->openapi)));
+    return true;
 }
 
-void routes_techniques(struct call *call)
+bool route_techniques(struct call *call, struct pen_error *error)
 {
-    routes_json(call, 200, pen_techniques_json(call->service->catalogue));
+    (void)error;
+    return call_json(call, 200, pen_techniques_json(call->service->catalogue));
 }
 
-void routes_technique(struct call *call)
+bool route_technique(struct call *call, struct pen_error *error)
 {
-    const struct pen_technique_info *info =
-        pen_catalogue_find(call->service->catalogue, call->name);
-    struct pen_error error = {0};
-    if (info) {
-        routes_json(call, 200, pen_technique_json(info));
-        return;
-    }
-    pen_fail(&error, PEN_NOT_FOUND, "", "There is no method called \"%s\".", call->name);
-    routes_fail(call, &error);
+    const char *name = call->address.name;
+    const struct pen_technique_info *info = pen_catalogue_find(call->service->catalogue, name);
+    if (!info)
+        return pen_fail(error, PEN_NOT_FOUND, "", "There is no method called \"%s\".", name);
+    return call_json(call, 200, pen_technique_json(info));
 }
 
-void routes_stats(struct call *call)
+bool route_stats(struct call *call, struct pen_error *error)
 {
+    (void)error;
     http_add_header(call->exchange, "Cache-Control", "no-store");
-    routes_json(call, 200, metrics_stats_json(call->service->metrics));
-}
-
-static void write_device(struct pen_json *json, const struct worker_pool_numbers *pool)
-{
-    if (!pool->has_device) {
-        pen_json_null(json, "device");
-        return;
-    }
-    pen_json_object(json, "device");
-    pen_json_string(json, "renderer", pool->device.renderer);
-    pen_json_string(json, "version", pool->device.version);
-    pen_json_string(json, "platform", pool->device.platform);
-    pen_json_bool(json, "software", pool->device.software != 0);
-    pen_json_end(json);
+    return call_json(call, 200, metrics_stats_json(call->service->metrics));
 }
 
 static void write_limits(struct pen_json *json, const struct config *config)
@@ -87,8 +76,9 @@ static void write_limits(struct pen_json *json, const struct config *config)
     pen_json_end(json);
 }
 
-void routes_info(struct call *call)
+bool route_service(struct call *call, struct pen_error *error)
 {
+    (void)error;
     struct service *s = call->service;
     struct worker_pool_numbers pool;
     struct scheduler_numbers queue;
@@ -100,7 +90,10 @@ void routes_info(struct call *call)
     pen_json_string(&json, "version", PENUMBRA_VERSION);
     pen_json_string(&json, "build", picture_build());
     pen_json_double(&json, "uptime_s", clock_ms(clock_now_ns() - s->started_ns) / 1e3);
-    write_device(&json, &pool);
+    if (pool.has_device)
+        pen_result_write_device(&json, &pool.device);
+    else
+        pen_json_null(&json, "device");
     pen_json_object(&json, "workers");
     pen_json_uint(&json, "configured", s->config->workers);
     pen_json_uint(&json, "up", pool.up);
@@ -128,5 +121,5 @@ void routes_info(struct call *call)
     pen_json_end(&json);
     pen_json_end(&json);
     http_add_header(call->exchange, "Cache-Control", "no-store");
-    routes_json(call, 200, pen_json_finish(&json, NULL));
+    return call_json(call, 200, pen_json_finish(&json, NULL));
 }

@@ -1,155 +1,149 @@
 /* Render requests, from the cache or from a worker, and finished results. */
 #include "protocol/json_request.h"
 #include "protocol/json_result.h"
-#include "server/http/accept.h"
 #include "server/auto/choice.h"
 #include "server/base/clock.h"
 #include "server/base/container.h"
+#include "server/http/accept.h"
+#include "server/http/query.h"
 #include "server/routes/routes.h"
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-static bool is_gone(struct waiter *waiter)
-{
-    struct call *call = container_of(waiter, struct call, waiter);
-    return http_client_is_gone(call->exchange);
-}
+struct rendering {
+    struct call *call;
+    struct pen_request request;
+    struct auto_render choice; /* choice.why "": the method was given */
+    struct waiter waiter;
+    struct picture *picture; /* when there is one */
+    bool wants_record, holds_share, is_deferred;
+};
 
-static void release_picture(void *picture)
-{
-    picture_release(picture);
-}
+/* ---- what is asked ---- */
 
-/* The picture's own headers; `total_ms` counts from the last byte of the request. */
-static void add_picture_headers(struct call *call, const struct picture *picture, double total_ms)
+static enum step_end read_request(struct call *call, struct pen_error *error)
 {
-    struct http_exchange *x = call->exchange;
-    char timing[560];
-    if (call->is_cached)
-        snprintf(timing, sizeof timing, "cache;desc=\"hit\", total;dur=%.3f", total_ms);
-    else
-        pen_server_timing(&picture->result, total_ms, timing, sizeof timing);
-    http_add_header(x, "Server-Timing", "%s", timing);
-    http_add_header(x, "Vary", "Accept");
-    http_add_header(x, "Cache-Control", "no-cache"); /* keep it, but ask: a restart may change it */
-    if (*call->choice)
-        http_add_header(x, "X-Penumbra-Choice", "%s", call->choice);
-    if (*call->choice && !call->choice_met)
-        http_add_header(x, "X-Penumbra-Warning", "%s", call->choice);
-    for (uint32_t i = 0; i < picture->result.warning_count && i < 3; i++)
-        http_add_header(x, "X-Penumbra-Warning", "%s", picture->result.warnings[i]);
-}
-
-static void answer_picture(struct call *call, struct picture *picture)
-{
-    struct service *s = call->service;
-    struct http_exchange *x = call->exchange;
-    double total_ms = clock_ms(clock_now_ns() - x->body_ns);
-    char href[PEN_ID_HEX + 16];
-    snprintf(href, sizeof href, "/v1/results/%s", picture->tag);
-    call->render_ms = 0;
-    for (int stage = PEN_STAGE_LOAD; stage < PEN_STAGES; stage++)
-        call->render_ms += picture->result.stage_ms[stage];
-    if (!call->is_cached && total_ms >= call->render_ms)
-        metrics_overhead(s->metrics, total_ms - call->render_ms - call->queue_ms);
-    add_picture_headers(call, picture, total_ms);
-    if (call->wants_record) {
-        bool kept = picture_cost(picture) <= s->config->result_cache.bytes;
-        struct pen_record_extra extra = {.request_id = x->request_id,
-            .image_href = kept ? href : NULL,
-            .etag = picture->tag,
-            .total_ms = total_ms,
-            .from_cache = call->is_cached,
-            .choice = *call->choice ? call->choice : NULL,
-            .choice_met = call->choice_met};
-        routes_json(call, 200, pen_result_json(&picture->result, &extra, s->catalogue));
-        return;
-    }
-    http_add_header(x, "Content-Location", "%s", href);
-    if (routes_not_modified(call, picture->tag))
-        return;
-    struct http_body body = {
-        picture->data, picture->size, release_picture, picture_reference(picture)};
-    http_answer(x, 200, pen_format_mime[picture->result.completed.output.format], body);
-}
-
-/* Any thread. */
-static void finish(struct waiter *waiter, const struct outcome *outcome)
-{
-    struct call *call = container_of(waiter, struct call, waiter);
-    call->queue_ms = outcome->queue_ms;
-    if (*call->choice && outcome->error.code == PEN_OK)
-        auto_runs_observe(call->service->auto_runs, call, outcome->run_ms);
-    if (outcome->error.code != PEN_OK)
-        routes_fail(call, &outcome->error);
-    else
-        answer_picture(call, outcome->picture);
-}
-
-/* The request struct, from the query or the body. */
-static bool read_request(struct call *call, struct pen_error *error)
-{
+    struct rendering *work = call->work;
     const struct pen_catalogue *catalogue = call->service->catalogue;
-    if (call->route == PEN_ROUTE_RENDER_POST) {
-        if (call->exchange->query && *call->exchange->query)
-            return pen_fail(error, PEN_MALFORMED, "",
-                "A posted render request is all in its body: there can be no query.");
-        const char *text = call->text_bytes ? call->text : "{}";
-        return pen_request_from_json(
-            text, call->text_bytes ? call->text_bytes : 2, catalogue, &call->request, error);
+    char *query = call->exchange->query;
+    bool ok;
+    if (call->address.route->flags & PEN_ROUTE_QUERY) {
+        struct pen_query_pair pairs[HTTP_MAX_PAIRS];
+        uint32_t count;
+        ok = http_split_query(query, pairs, &count, error) &&
+             pen_request_from_query(pairs, count, catalogue, &work->request, error);
+    } else if (query && *query) {
+        ok = pen_fail(error, PEN_MALFORMED, "",
+            "A posted render request is all in its body: there can be no query.");
+    } else {
+        size_t bytes;
+        const char *text = body_json(&call->body, &bytes);
+        ok = pen_request_from_json(text, bytes, catalogue, &work->request, error);
     }
-    struct pen_query_pair pairs[ROUTES_MAX_PAIRS];
-    uint32_t count;
-    return routes_split_query(call->exchange->query, pairs, &count, error) &&
-           pen_request_from_query(pairs, count, catalogue, &call->request, error);
+    memcpy(work->request.scene, call->address.id, PEN_ID_BYTES);
+    return ok ? STEP_NEXT : STEP_FAILED;
 }
 
 /* Lets Accept choose the format when the request left it at its default. */
-static bool negotiate(struct call *call, struct pen_error *error)
+static enum step_end negotiate(struct call *call, struct pen_error *error)
 {
+    struct rendering *work = call->work;
     const char *accept = http_header(call->exchange, "Accept");
-    struct pen_output *output = &call->request.output;
-    call->wants_record = accept_record(accept);
-    if (call->wants_record || accept_allows(accept, pen_format_mime[output->format]))
-        return true;
+    struct pen_output *output = &work->request.output;
+    work->wants_record = accept_record(accept);
+    if (work->wants_record || accept_allows(accept, pen_format_mime[output->format]))
+        return STEP_NEXT;
     bool is_default = output->format == PEN_PNG;
     for (uint32_t f = 0; is_default && f < PEN_FORMATS; f++) {
         if (!accept_allows(accept, pen_format_mime[f]))
             continue;
         struct pen_error fault = {0};
         output->format = f;
-        if (pen_request_check(&call->request, call->service->catalogue, &fault))
-            return true;
+        if (pen_request_check(&work->request, call->service->catalogue, &fault))
+            return STEP_NEXT;
         output->format = PEN_PNG;
     }
-    return pen_fail(error, PEN_NOT_ACCEPTABLE, "/output/format",
+    pen_fail(error, PEN_NOT_ACCEPTABLE, "/output/format",
         "The image is %s, which Accept does not allow.", pen_format_mime[output->format]);
+    return STEP_FAILED;
 }
 
-bool routes_check_store(struct call *call, struct pen_error *error)
+bool routes_check_store(
+    struct call *call, const struct pen_request *request, struct pen_error *error)
 {
     struct service *s = call->service;
     struct store_entry entry;
-    if (!scene_store_find(s->store, STORE_SCENES, call->id, &entry))
+    if (!scene_store_find(s->store, STORE_SCENES, request->scene, &entry))
         return pen_fail(error, PEN_NOT_FOUND, "", "There is no such scene.");
     if (entry.stale)
         return pen_fail(error, PEN_UNAVAILABLE, "", "The scene is being imported again.");
-    for (uint32_t i = 0; i < call->request.light_count; i++) {
-        const struct pen_light *light = &call->request.lights[i];
+    for (uint32_t i = 0; i < request->light_count; i++) {
+        const struct pen_light *light = &request->lights[i];
         char pointer[40];
         snprintf(pointer, sizeof pointer, "/lights/%u/texture/image", i);
         if (light->texture == PEN_TEXTURE_IMAGE &&
             !scene_store_find(s->store, STORE_IMAGES, light->image, NULL))
             return pen_fail(error, PEN_INVALID, pointer, "There is no such image.");
     }
-    uint32_t refused_s = worker_pool_quarantine_s(s->pool, call->id);
+    uint32_t refused_s = worker_pool_quarantine_s(s->pool, request->scene);
     if (refused_s)
         return pen_fail(error, PEN_INVALID, "",
             "Rendering this scene ended the renderer twice: it is refused for %u more seconds.",
             refused_s);
     return true;
 }
+
+static enum step_end look_up(struct call *call, struct pen_error *error)
+{
+    const struct rendering *work = call->work;
+    return routes_check_store(call, &work->request, error) ? STEP_NEXT : STEP_FAILED;
+}
+
+/* ---- the method, when it is left open ---- */
+
+/* The device, once a worker has told. */
+static bool read_device(struct service *s, struct pen_device_info *device)
+{
+    struct worker_pool_numbers numbers;
+    worker_pool_read(s->pool, &numbers);
+    *device = numbers.device;
+    return numbers.has_device;
+}
+
+/* Any thread. */
+static void chosen(struct auto_render *choice, const struct pen_error *error)
+{
+    struct rendering *work = container_of(choice, struct rendering, choice);
+    call_resume(work->call, error);
+}
+
+/* Waits when the scene must be measured first. */
+static enum step_end choose(struct call *call, struct pen_error *error)
+{
+    struct rendering *work = call->work;
+    struct auto_runs *runs = call->service->auto_runs;
+    struct pen_device_info device;
+    if (strcmp(work->request.technique, AUTO_NAME))
+        return STEP_NEXT;
+    if (!read_device(call->service, &device)) {
+        pen_fail(error, PEN_UNAVAILABLE, "", "The worker is still starting.");
+        return STEP_FAILED;
+    }
+    work->choice.request = &work->request;
+    work->choice.deadline_ns =
+        call->exchange->body_ns + work->request.delivery.deadline_ms * CLOCK_MS;
+    work->choice.chosen = chosen;
+    if (auto_runs_recall(runs, &device, &work->choice, error))
+        return STEP_NEXT;
+    if (error->code != PEN_OK)
+        return STEP_FAILED;
+    work->is_deferred = true;
+    http_defer(call->exchange);
+    return auto_runs_measure(runs, &device, &work->choice, error) ? STEP_OVER : STEP_FAILED;
+}
+
+/* ---- the picture ---- */
 
 /* Caches may be passed by: Cache-Control: no-cache renders anew. */
 static bool wants_fresh(const struct call *call)
@@ -158,82 +152,192 @@ static bool wants_fresh(const struct call *call)
     return control && strstr(control, "no-cache");
 }
 
-void routes_render(struct call *call)
+static enum step_end recall(struct call *call, struct pen_error *error)
 {
-    struct pen_error error = {0};
-    if (!read_request(call, &error) || !negotiate(call, &error)) {
-        routes_fail(call, &error);
-        return;
-    }
-    memcpy(call->request.scene, call->id, PEN_ID_BYTES);
-    if (!routes_check_store(call, &error)) {
-        routes_fail(call, &error);
-        return;
-    }
-    if (!strcmp(call->request.technique, AUTO_NAME))
-        routes_auto(call);
-    else
-        routes_serve(call);
-}
-
-void routes_serve(struct call *call)
-{
+    (void)error;
     struct service *s = call->service;
-    struct pen_error error = {0};
+    struct rendering *work = call->work;
     struct pen_device_info device;
-    call->technique = pen_catalogue_find(s->catalogue, call->request.technique)->name;
-    bool fresh = wants_fresh(call);
-    if (!fresh && service_device(s, &device)) {
-        char tag[PEN_ID_HEX + 1];
-        picture_tag(&call->request, &device, tag);
-        const char *known = http_header(call->exchange, "If-None-Match");
-        if (!call->wants_record && known && strstr(known, tag)) {
-            http_add_header(call->exchange, "Vary", "Accept");
-            routes_not_modified(call, tag);
-            return;
-        }
-        struct picture *picture = result_cache_get(s->cache, tag);
-        if (picture) {
-            call->is_cached = true;
-            answer_picture(call, picture);
-            picture_release(picture);
-            return;
-        }
+    char tag[PEN_ID_HEX + 1];
+    call->note.technique = pen_catalogue_find(s->catalogue, work->request.technique)->name;
+    if (wants_fresh(call) || !read_device(s, &device))
+        return STEP_NEXT;
+    picture_tag(&work->request, &device, tag);
+    if (!work->wants_record && call_knows(call, tag)) {
+        http_add_header(call->exchange, "Vary", "Accept");
+        call_not_modified(call, tag);
+        return STEP_OVER;
     }
-    uint8_t key[PEN_ID_BYTES];
-    picture_key(&call->request, key);
-    call->waiter.client = call->client;
-    call->waiter.deadline_ns =
-        call->exchange->body_ns + call->request.delivery.deadline_ms * CLOCK_MS;
-    call->waiter.is_gone = is_gone;
-    call->waiter.finish = finish;
-    call->holds_share = true; /* before another thread can complete the call */
-    if (!call->is_deferred)
-        http_defer(call->exchange);
-    if (!scheduler_submit(s->scheduler, &call->request, key, !fresh, &call->waiter, &error)) {
-        call->holds_share = false;
-        routes_fail(call, &error);
-    }
+    work->picture = result_cache_get(s->cache, tag);
+    call->note.cached = work->picture != NULL;
+    return STEP_NEXT;
 }
 
-void routes_result(struct call *call)
+static struct rendering *rendering_of(struct waiter *waiter)
+{
+    return container_of(waiter, struct rendering, waiter);
+}
+
+static bool is_gone(struct waiter *waiter)
+{
+    return http_client_is_gone(rendering_of(waiter)->call->exchange);
+}
+
+/* Any thread. */
+static void finish(struct waiter *waiter, const struct outcome *outcome)
+{
+    struct rendering *work = rendering_of(waiter);
+    struct call *call = work->call;
+    call->note.queue_ms = outcome->queue_ms;
+    if (outcome->error.code == PEN_OK) {
+        work->picture = picture_reference(outcome->picture);
+        if (*work->choice.why)
+            auto_runs_observe(call->service->auto_runs, &work->choice, outcome->run_ms);
+    }
+    call_resume(call, &outcome->error);
+}
+
+/* Waits for a worker. */
+static enum step_end queue(struct call *call, struct pen_error *error)
+{
+    struct rendering *work = call->work;
+    uint8_t key[PEN_ID_BYTES];
+    if (work->picture)
+        return STEP_NEXT;
+    picture_key(&work->request, key);
+    work->waiter = (struct waiter){.client = call->client,
+        .deadline_ns = call->exchange->body_ns + work->request.delivery.deadline_ms * CLOCK_MS,
+        .is_gone = is_gone,
+        .finish = finish};
+    work->holds_share = true; /* before another thread can complete the call */
+    if (!work->is_deferred)
+        http_defer(call->exchange);
+    if (scheduler_submit(call->service->scheduler, &work->request, key, !wants_fresh(call),
+            &work->waiter, error))
+        return STEP_OVER;
+    work->holds_share = false;
+    return STEP_FAILED;
+}
+
+/* ---- the answer ---- */
+
+/* The picture's own headers; `total_ms` counts from the last byte of the request. */
+static void add_picture_headers(struct call *call, double total_ms)
+{
+    struct http_exchange *x = call->exchange;
+    const struct rendering *work = call->work;
+    const struct pen_result *result = &work->picture->result;
+    const char *why = work->choice.why;
+    char timing[560];
+    if (call->note.cached)
+        snprintf(timing, sizeof timing, "cache;desc=\"hit\", total;dur=%.3f", total_ms);
+    else
+        pen_server_timing(result, total_ms, timing, sizeof timing);
+    http_add_header(x, "Server-Timing", "%s", timing);
+    http_add_header(x, "Vary", "Accept");
+    http_add_header(x, "Cache-Control", "no-cache"); /* keep it, but ask: a restart may change it */
+    if (*why)
+        http_add_header(x, "X-Penumbra-Choice", "%s", why);
+    if (*why && !work->choice.met)
+        http_add_header(x, "X-Penumbra-Warning", "%s", why);
+    for (uint32_t i = 0; i < result->warning_count && i < 3; i++)
+        http_add_header(x, "X-Penumbra-Warning", "%s", result->warnings[i]);
+}
+
+static void release_picture(void *picture)
+{
+    picture_release(picture);
+}
+
+static void send_picture(struct call *call, struct picture *picture)
+{
+    struct http_body body = {
+        picture->data, picture->size, release_picture, picture_reference(picture)};
+    http_answer(
+        call->exchange, 200, pen_format_mime[picture->result.completed.output.format], body);
+}
+
+static enum step_end answer(struct call *call, struct pen_error *error)
+{
+    (void)error;
+    struct service *s = call->service;
+    struct http_exchange *x = call->exchange;
+    struct rendering *work = call->work;
+    struct picture *picture = work->picture;
+    struct call_note *note = &call->note;
+    double total_ms = clock_ms(clock_now_ns() - x->body_ns);
+    char href[PEN_ID_HEX + 16];
+    snprintf(href, sizeof href, "/v1/results/%s", picture->tag);
+    for (int stage = PEN_STAGE_LOAD; stage < PEN_STAGES; stage++)
+        note->render_ms += picture->result.stage_ms[stage];
+    if (!note->cached && total_ms >= note->render_ms)
+        metrics_overhead(s->metrics, total_ms - note->render_ms - note->queue_ms);
+    add_picture_headers(call, total_ms);
+    if (work->wants_record) {
+        bool kept = picture_cost(picture) <= s->config->result_cache.bytes;
+        struct pen_record_extra extra = {.request_id = x->request_id,
+            .image_href = kept ? href : NULL,
+            .etag = picture->tag,
+            .total_ms = total_ms,
+            .from_cache = note->cached,
+            .choice = *work->choice.why ? work->choice.why : NULL,
+            .choice_met = work->choice.met};
+        call_json(call, 200, pen_result_json(&picture->result, &extra, s->catalogue));
+        return STEP_OVER;
+    }
+    http_add_header(x, "Content-Location", "%s", href);
+    if (!call_not_modified(call, picture->tag))
+        send_picture(call, picture);
+    return STEP_OVER;
+}
+
+static void end_rendering(struct call *call, void *given)
+{
+    struct rendering *work = given;
+    if (work->holds_share)
+        scheduler_release(call->service->scheduler, call->client);
+    picture_release(work->picture);
+}
+
+static const struct step steps[] = {
+    {"read", read_request},   /* the query or the body */
+    {"negotiate", negotiate}, /* the format, or the record, with Accept */
+    {"look up", look_up},     /* the scene, and the images of its lights */
+    {"choose", choose},       /* the method, when it is left open; may wait for measurements */
+    {"recall", recall},       /* the picture from the cache; answers when the client has it */
+    {"queue", queue},         /* else waits for a worker */
+    {"answer", answer},
+};
+
+static bool render(struct call *call, struct pen_error *error)
+{
+    struct rendering *work = call_work(call, sizeof *work, end_rendering);
+    work->call = call;
+    return call_run(call, steps, error);
+}
+
+bool route_render(struct call *call, struct pen_error *error)
+{
+    return render(call, error);
+}
+
+bool route_render_query(struct call *call, struct pen_error *error)
+{
+    return render(call, error);
+}
+
+bool route_result(struct call *call, struct pen_error *error)
 {
     char tag[PEN_ID_HEX + 1];
-    pen_id_to_hex(call->id, tag);
+    pen_id_to_hex(call->address.id, tag);
     struct picture *picture = result_cache_get(call->service->cache, tag);
-    if (!picture) {
-        struct pen_error error = {0};
-        pen_fail(&error, PEN_NOT_FOUND, "", "The result is not kept any more: render it again.");
-        routes_fail(call, &error);
-        return;
-    }
-    call->is_cached = true;
+    if (!picture)
+        return pen_fail(
+            error, PEN_NOT_FOUND, "", "The result is not kept any more: render it again.");
+    call->note.cached = true;
     http_add_header(call->exchange, "Cache-Control", "public, max-age=31536000, immutable");
-    if (!routes_not_modified(call, tag)) {
-        struct http_body body = {
-            picture->data, picture->size, release_picture, picture_reference(picture)};
-        http_answer(
-            call->exchange, 200, pen_format_mime[picture->result.completed.output.format], body);
-    }
+    if (!call_not_modified(call, tag))
+        send_picture(call, picture);
     picture_release(picture);
+    return true;
 }

@@ -2,6 +2,7 @@
 #include "protocol/json_result.h"
 #include "protocol/memory.h"
 #include "renderer/blob/pscene.h"
+#include <cjson/cJSON.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -98,22 +99,31 @@ char *describe_blob(enum store_kind kind, const uint8_t id[PEN_ID_BYTES], int bl
 }
 
 char *describe_stored(struct scene_store *store, enum store_kind kind,
-    const uint8_t id[PEN_ID_BYTES], struct pen_error *error)
+    const uint8_t id[PEN_ID_BYTES], bool resident, struct pen_error *error)
 {
     struct stat status;
-    char *text = NULL;
+    cJSON *root = NULL;
     int fd = scene_store_open_meta(store, kind, id, error);
     if (fd < 0)
         return NULL;
-    bool ok = !fstat(fd, &status) && status.st_size > 0 && status.st_size <= MAX_META &&
-              (text = malloc((size_t)status.st_size + 1)) &&
-              read(fd, text, (size_t)status.st_size) == (ssize_t)status.st_size;
+    size_t bytes = !fstat(fd, &status) && status.st_size > 0 && status.st_size <= MAX_META
+                       ? (size_t)status.st_size
+                       : 0;
+    char *text = pen_alloc(bytes + 1, 1);
+    if (bytes && read(fd, text, bytes) == (ssize_t)bytes)
+        root = cJSON_ParseWithLength(text, bytes);
     close(fd);
-    if (ok) {
-        text[status.st_size] = 0;
-        return text;
-    }
     free(text);
-    pen_fail(error, PEN_UNAVAILABLE, "", "The store could not be read.");
-    return NULL;
+    if (!cJSON_IsObject(root)) {
+        cJSON_Delete(root);
+        pen_fail(error, PEN_UNAVAILABLE, "", "The store could not be read.");
+        return NULL;
+    }
+    if (kind == STORE_SCENES)
+        cJSON_ReplaceItemInObjectCaseSensitive(root, "resident", cJSON_CreateBool(resident));
+    text = cJSON_PrintUnformatted(root);
+    cJSON_Delete(root);
+    if (!text)
+        abort();
+    return text;
 }

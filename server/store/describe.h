@@ -6,6 +6,7 @@
  * that does not pass psc_open, or that is of another source. */
 char *describe_blob(enum store_kind kind, const uint8_t id[PEN_ID_BYTES], int blob_fd,
     uint64_t source_bytes, struct pen_error *error);
-/* The stored document, malloc'd. Errors: PEN_NOT_FOUND, PEN_UNAVAILABLE. */
+/* The stored document, malloc'd, with what is true of a scene now. Errors: PEN_NOT_FOUND,
+ * PEN_UNAVAILABLE. */
 char *describe_stored(struct scene_store *store, enum store_kind kind,
-    const uint8_t id[PEN_ID_BYTES], struct pen_error *error);
+    const uint8_t id[PEN_ID_BYTES], bool resident, struct pen_error *error);

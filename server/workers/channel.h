@@ -2,20 +2,12 @@
  * descriptors attached. Both ends come from one build; the version catches a mixed installation. */
 #pragma once
 #include "protocol/result.h"
+#include "server/queue/measure.h"
 #include <stddef.h>
 
 #define CHANNEL_VERSION 2u
 #define CHANNEL_WORKER_FD 3 /* the worker's end */
 #define CHANNEL_MAX_FDS (2 + PEN_MAX_LIGHTS)
-
-/* What a job's answer holds, one sealed memfd each. */
-enum channel_measure {
-    CHANNEL_PICTURE,   /* the image as the request wants it */
-    CHANNEL_REFERENCE, /* a PNG and the planes that others are measured against */
-    CHANNEL_COMPARED,  /* a PNG, then the maps of enum channel_map; result.comparison is filled */
-    CHANNEL_NUMBERS,   /* nothing but result.comparison */
-};
-enum channel_map { CHANNEL_DIFFERENCE, CHANNEL_SSIM, CHANNEL_FLIP, CHANNEL_MAPS };
 
 /* --warm-up N: when the worker compiles what common requests need. */
 enum worker_warm_up { WORKER_NO_WARM_UP, WORKER_WARM_UP_FIRST, WORKER_WARM_UP_IDLE };
@@ -26,11 +18,11 @@ enum channel_kind {
     CHANNEL_WARM,      /* worker: warmed up */
     CHANNEL_STARTED,   /* worker: the GL thread takes this job */
     CHANNEL_RENDERED,  /* worker: the GL thread is done with it, encoding follows */
-    CHANNEL_DONE,      /* worker: the answer; descriptors as enum channel_measure says */
-    CHANNEL_RESIDENT,  /* worker: the scenes in GPU memory, when they have changed */
-    CHANNEL_JOB,       /* front end: descriptors: the scene's blob, `image_count` images, and the
+    CHANNEL_DONE,     /* worker: the answer; a sealed memfd for each thing that enum measure says */
+    CHANNEL_RESIDENT, /* worker: the scenes in GPU memory, when they have changed */
+    CHANNEL_JOB,      /* front end: descriptors: the scene's blob, `image_count` images, and the
                           reference's planes when there is something to compare with */
-    CHANNEL_DROP,      /* front end: the scene was deleted */
+    CHANNEL_DROP,     /* front end: the scene was deleted */
     CHANNEL_KINDS
 };
 
@@ -47,13 +39,9 @@ struct channel_warm {
 struct channel_job {
     struct pen_request request;
     uint32_t image_count;
-    uint32_t measure;                             /* enum channel_measure */
+    uint32_t measure;                             /* enum measure */
     uint8_t images[PEN_MAX_LIGHTS][PEN_ID_BYTES]; /* in the order of the descriptors */
 };
-static inline bool channel_has_reference(uint32_t measure)
-{
-    return measure == CHANNEL_COMPARED || measure == CHANNEL_NUMBERS;
-}
 #define CHANNEL_MAX_RESIDENT 128 /* the ones used last, if there are more */
 struct channel_resident {
     uint32_t count, reserved;

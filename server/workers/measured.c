@@ -13,22 +13,22 @@ static struct picture *take_picture(int fd, struct outcome *outcome)
 void measured_take(uint32_t measure, const struct channel_fds *fds, struct outcome *outcome)
 {
     static const uint32_t counts[] = {
-        [CHANNEL_REFERENCE] = 2, [CHANNEL_COMPARED] = 1 + CHANNEL_MAPS, [CHANNEL_NUMBERS] = 0};
+        [MEASURE_REFERENCE] = 2, [MEASURE_COMPARED] = 1 + MEASURE_MAPS, [MEASURE_NUMBERS] = 0};
     if (fds->count != counts[measure]) {
         pen_fail(&outcome->error, PEN_INTERNAL, "", "The worker handed over half a measurement.");
         return;
     }
     if (fds->count)
         outcome->picture = take_picture(fds->fd[0], outcome);
-    if (measure == CHANNEL_REFERENCE)
+    if (measure == MEASURE_REFERENCE)
         outcome->planes_fd = fds->fd[1];
-    for (int m = 0; measure == CHANNEL_COMPARED && m < CHANNEL_MAPS; m++)
+    for (int m = 0; measure == MEASURE_COMPARED && m < MEASURE_MAPS; m++)
         outcome->maps[m] = take_picture(fds->fd[1 + m], outcome);
 }
 
 void measured_release(struct outcome *outcome)
 {
     picture_release(outcome->picture);
-    for (int m = 0; m < CHANNEL_MAPS; m++)
+    for (int m = 0; m < MEASURE_MAPS; m++)
         picture_release(outcome->maps[m]);
 }

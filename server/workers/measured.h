@@ -1,4 +1,4 @@
-/* What comes back from a job that measures; see enum channel_measure. */
+/* What comes back from a job that measures; see enum measure. */
 #pragma once
 #include "server/workers/channel.h"
 #include "server/queue/scheduler.h"

@@ -100,8 +100,8 @@ static bool run_job(
     item->measure = job->measure;
     item->reference_fd = -1;
     result->completed = job->request;
-    bool compares = channel_has_reference(job->measure);
-    bool ok = job->image_count <= PEN_MAX_LIGHTS && job->measure <= CHANNEL_NUMBERS &&
+    bool compares = measure_has_reference(job->measure);
+    bool ok = job->image_count <= PEN_MAX_LIGHTS && job->measure <= MEASURE_NUMBERS &&
               fds->count == 1 + job->image_count + compares;
     if (!ok)
         pen_fail(error, PEN_INTERNAL, "", "The worker was handed an incomplete job.");
@@ -111,7 +111,7 @@ static bool run_job(
     ok = ok && load(worker, job, fds, error);
     double load_ms = clock_ms(clock_now_ns() - start);
     struct pen_request request = job->request;
-    if (ok && job->measure != CHANNEL_PICTURE) {
+    if (ok && job->measure != MEASURE_PICTURE) {
         worker_measure_output(&request.output);
         pen_renderer_drop_shadows(worker->renderer);
     }

@@ -80,7 +80,7 @@ static void encode(struct worker_encoder *encoder, struct worker_item *item)
     struct channel_fds fds = {0};
     if (result->error.code == PEN_OK) {
         uint64_t start = clock_now_ns();
-        bool ok = item->measure == CHANNEL_PICTURE ? encode_picture(item, result, &fds)
+        bool ok = item->measure == MEASURE_PICTURE ? encode_picture(item, result, &fds)
                                                    : worker_measure(item, &fds);
         if (!ok && result->error.code == PEN_OK)
             pen_fail(&result->error, PEN_INTERNAL, "", "The image could not be encoded.");

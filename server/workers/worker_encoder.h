@@ -7,7 +7,7 @@ struct worker_item { /* allocated by the caller, freed by the encoder */
     struct worker_item *next;
     struct channel_message message; /* CHANNEL_DONE; with an error there is no frame */
     struct pen_output output;
-    uint32_t measure; /* enum channel_measure */
+    uint32_t measure; /* enum measure */
     int reference_fd; /* planes to compare with, the item's own; -1: none */
     struct pen_frame frame;
 };

@@ -164,28 +164,28 @@ static bool compare(const struct planes *test, const struct planes *reference, f
     if (!maps)
         return true;
     for (size_t i = 0; i < (size_t)test->width * test->height; i++)
-        maps[CHANNEL_DIFFERENCE][i] = test->visibility[i] - reference->visibility[i];
+        maps[MEASURE_MAP_DIFFERENCE][i] = test->visibility[i] - reference->visibility[i];
     a = (struct pen_metrics_image){test->display, test->width, test->height, 3};
     b = (struct pen_metrics_image){reference->display, reference->width, reference->height, 3};
-    return pen_metrics_ssim(&a, &b, maps[CHANNEL_SSIM], &out->ssim, error) &&
-           pen_metrics_flip(&a, &b, 0, maps[CHANNEL_FLIP], &out->flip, error);
+    return pen_metrics_ssim(&a, &b, maps[MEASURE_MAP_SSIM], &out->ssim, error) &&
+           pen_metrics_flip(&a, &b, 0, maps[MEASURE_MAP_FLIP], &out->flip, error);
 }
 
 static bool compare_and_paint(const struct worker_item *item, const struct planes *test,
     const struct planes *reference, struct pen_result *result, struct channel_fds *fds)
 {
     static void (*const paint[])(const void *, size_t, float[3]) = {
-        [CHANNEL_DIFFERENCE] = paint_difference,
-        [CHANNEL_SSIM] = paint_grey,
-        [CHANNEL_FLIP] = paint_heat};
+        [MEASURE_MAP_DIFFERENCE] = paint_difference,
+        [MEASURE_MAP_SSIM] = paint_grey,
+        [MEASURE_MAP_FLIP] = paint_heat};
     size_t pixels = (size_t)test->width * test->height;
-    bool wants_maps = item->measure == CHANNEL_COMPARED;
-    float *values = wants_maps ? malloc(pixels * CHANNEL_MAPS * sizeof *values) : NULL;
-    float *maps[CHANNEL_MAPS];
-    for (int m = 0; m < CHANNEL_MAPS; m++)
+    bool wants_maps = item->measure == MEASURE_COMPARED;
+    float *values = wants_maps ? malloc(pixels * MEASURE_MAPS * sizeof *values) : NULL;
+    float *maps[MEASURE_MAPS];
+    for (int m = 0; m < MEASURE_MAPS; m++)
         maps[m] = values ? values + (size_t)m * pixels : NULL;
     bool ok = compare(test, reference, values ? maps : NULL, &result->comparison, &result->error);
-    for (int m = 0; ok && values && m < CHANNEL_MAPS; m++)
+    for (int m = 0; ok && values && m < MEASURE_MAPS; m++)
         ok = hand_over_png(test, maps[m], paint[m], fds, NULL, &result->error);
     free(values);
     return ok;
@@ -203,10 +203,10 @@ bool worker_measure(struct worker_item *item, struct channel_fds *fds)
     if (!header)
         return pen_fail(error, PEN_INTERNAL, "", "There is nothing to measure.");
     struct planes test = read_planes(header);
-    if (item->measure != CHANNEL_NUMBERS &&
+    if (item->measure != MEASURE_NUMBERS &&
         !hand_over_png(&test, test.display, paint_display, fds, &result->image_bytes, error))
         goto done;
-    if (item->measure == CHANNEL_REFERENCE) {
+    if (item->measure == MEASURE_REFERENCE) {
         struct pen_bytes all = {(uint8_t *)header, bytes};
         ok = worker_encoder_hand_over(&all, fds, error);
         goto done;

@@ -257,7 +257,7 @@ static void on_done(
     pool->numbers.gpu_bytes = result.gpu_bytes;
     pthread_mutex_unlock(&pool->lock);
     outcome.result = &result;
-    if (outcome.error.code == PEN_OK && flight->render->measure != CHANNEL_PICTURE) {
+    if (outcome.error.code == PEN_OK && flight->render->measure != MEASURE_PICTURE) {
         measured_take(flight->render->measure, fds, &outcome);
     } else if (outcome.error.code == PEN_OK) {
         char tag[PEN_ID_HEX + 1];

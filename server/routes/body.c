@@ -1,0 +1,99 @@
+#include "server/routes/body.h"
+#include "protocol/memory.h"
+#include "server/routes/routes.h"
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+
+static bool is_json(const char *type)
+{
+    size_t length = strcspn(type, "; ");
+    return (length == 16 && !strncasecmp(type, "application/json", 16)) ||
+           (length > 17 && !strncasecmp(type, "application/", 12) &&
+               !strncasecmp(type + length - 5, "+json", 5));
+}
+
+static bool is_one_of(const char *type, const char *const *types)
+{
+    size_t bytes = strcspn(type, "; \t");
+    for (; *types; types++)
+        if (strlen(*types) == bytes && !strncasecmp(*types, type, bytes))
+            return true;
+    return false;
+}
+
+static bool is_longer(const struct http_exchange *x, uint64_t limit)
+{
+    return x->content_length != HTTP_UNKNOWN_LENGTH && x->content_length > limit;
+}
+
+static bool too_long(struct pen_error *error)
+{
+    return pen_fail(
+        error, PEN_TOO_BIG, "", "A render request has at most %d bytes.", PEN_MAX_JSON_BYTES);
+}
+
+static bool open_upload(struct call_body *body, struct service *s, enum pen_body takes,
+    const struct http_exchange *x, const char *type, struct pen_error *error)
+{
+    uint64_t limit = s->config->upload_limit.bytes;
+    if (service_is_draining(s))
+        return pen_fail(error, PEN_UNAVAILABLE, "", "The service is shutting down.");
+    if (!type || !is_one_of(type, pen_upload_types(takes)))
+        return pen_fail(error, PEN_UNKNOWN_TYPE, "",
+            takes == PEN_BODY_SCENE_UPLOAD
+                ? "A scene is model/gltf-binary, model/gltf+json, application/zip or "
+                  "multipart/form-data."
+                : "An image is image/png, image/jpeg or image/webp.");
+    if (is_longer(x, limit))
+        return pen_fail(
+            error, PEN_TOO_BIG, "", "An upload has at most %llu bytes.", (unsigned long long)limit);
+    body->has_place = true;
+    if (__atomic_add_fetch(&s->uploads, 1, __ATOMIC_ACQ_REL) > s->config->uploads)
+        return pen_fail(error, PEN_UNAVAILABLE, "", "Too many uploads are under way.");
+    body->upload = upload_create(s->store, type, limit, error);
+    return body->upload != NULL;
+}
+
+bool body_open(struct call_body *body, struct service *service, enum pen_body takes,
+    const struct http_exchange *x, struct pen_error *error)
+{
+    const char *type = http_header(x, "Content-Type");
+    if (takes == PEN_BODY_NONE)
+        return true;
+    if (pen_upload_types(takes)) {
+        bool ok = open_upload(body, service, takes, x, type, error);
+        if (!ok)
+            error->retry_after_s = ROUTES_BUSY_S;
+        return ok;
+    }
+    if (type && !is_json(type))
+        return pen_fail(error, PEN_UNKNOWN_TYPE, "", "A render request is application/json.");
+    return !is_longer(x, PEN_MAX_JSON_BYTES) || too_long(error);
+}
+
+bool body_add(struct call_body *body, const void *data, size_t bytes, struct pen_error *error)
+{
+    if (body->upload)
+        return upload_add(body->upload, data, bytes, error);
+    if (body->text_bytes + bytes > PEN_MAX_JSON_BYTES)
+        return too_long(error);
+    body->text = pen_grow(body->text, &body->capacity, body->text_bytes + bytes, 1);
+    memcpy(body->text + body->text_bytes, data, bytes);
+    body->text_bytes += bytes;
+    return true;
+}
+
+void body_finish(struct call_body *body, struct service *service)
+{
+    if (body->has_place)
+        __atomic_sub_fetch(&service->uploads, 1, __ATOMIC_ACQ_REL);
+    upload_destroy(body->upload);
+    free(body->text);
+}
+
+const char *body_json(const struct call_body *body, size_t *bytes)
+{
+    *bytes = body->text_bytes ? body->text_bytes : 2;
+    return body->text_bytes ? body->text : "{}";
+}

@@ -1,0 +1,78 @@
+#include "server/routes/call.h"
+#include "protocol/memory.h"
+#include "server/http/status.h"
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+bool call_run(struct call *call, const struct step *first, struct pen_error *error)
+{
+    for (const struct step *step = first;; step++) {
+        call->next = step + 1;
+        switch (step->run(call, error)) {
+        case STEP_NEXT:
+            continue;
+        case STEP_OVER:
+            return true;
+        case STEP_FAILED:
+            return false;
+        }
+    }
+}
+
+static void answer_problem(struct call *call, const struct pen_error *error)
+{
+    struct http_exchange *x = call->exchange;
+    struct http_status told = http_status_of((enum pen_code)error->code);
+    call->note.code = (enum pen_code)error->code;
+    snprintf(call->note.error, sizeof call->note.error, "%.*s", (int)sizeof call->note.error - 1,
+        error->message);
+    if (error->code == PEN_UNAVAILABLE || error->code == PEN_TOO_MANY)
+        http_add_header(x, "Retry-After", "%u", error->retry_after_s ? error->retry_after_s : 1);
+    if (error->code == PEN_UNAUTHORIZED)
+        http_add_header(x, "WWW-Authenticate", "Bearer");
+    http_add_header(x, "Cache-Control", "no-store");
+    http_answer(
+        x, told.status, "application/problem+json", http_text(http_problem(error, x->request_id)));
+}
+
+void call_resume(struct call *call, const struct pen_error *failure)
+{
+    struct pen_error error = {0};
+    if (failure && failure->code != PEN_OK)
+        answer_problem(call, failure);
+    else if (!call_run(call, call->next, &error))
+        answer_problem(call, &error);
+}
+
+void *call_work(struct call *call, size_t bytes, void (*end)(struct call *call, void *work))
+{
+    call->work = pen_alloc_zero(1, bytes);
+    call->end_work = end;
+    return call->work;
+}
+
+bool call_json(struct call *call, uint32_t status, char *text)
+{
+    http_answer(call->exchange, status, "application/json", http_text(text));
+    return true;
+}
+
+bool call_knows(const struct call *call, const char *tag)
+{
+    const char *known = http_header(call->exchange, "If-None-Match");
+    char quoted[PEN_ID_HEX + 3];
+    snprintf(quoted, sizeof quoted, "\"%s\"", tag);
+    /* The list form and weak tags need no parser: our tags cannot be part of another's. */
+    return known && strstr(known, quoted);
+}
+
+bool call_not_modified(struct call *call, const char *tag)
+{
+    const char *known = http_header(call->exchange, "If-None-Match");
+    http_add_header(call->exchange, "ETag", "\"%s\"", tag);
+    if (!call_knows(call, tag) && !(known && !strcmp(known, "*")))
+        return false;
+    http_answer(call->exchange, 304, NULL, http_static(NULL, 0));
+    return true;
+}

@@ -1,0 +1,47 @@
+/* What the routes work with: the parts of the running daemon. service.c makes and ends them. */
+#pragma once
+#include "protocol/technique_info.h"
+#include "server/auto/render.h"
+#include "server/base/config.h"
+#include "server/base/metrics.h"
+#include "server/http/auth.h"
+#include "server/http/http.h"
+#include "server/queue/scheduler.h"
+#include "server/store/importer.h"
+#include "server/store/result_cache.h"
+#include "server/store/scene_store.h"
+#include "server/workers/worker_pool.h"
+#include <pthread.h>
+
+struct service {
+    /* Constant after service_create. */
+    const struct config *config;
+    const struct pen_catalogue *catalogue;
+    struct scene_store *store;
+    struct importer *importer;
+    struct scheduler *scheduler;
+    struct worker_pool *pool;
+    struct result_cache *cache;
+    struct metrics *metrics;
+    struct auto_runs *auto_runs;
+    struct auth *auth; /* NULL: no token is asked for */
+    struct http_listener *listener, *admin;
+    char *openapi, openapi_tag[PEN_ID_HEX + 1];
+    char *cert_pem, *key_pem;
+    uint64_t started_ns;
+    int canary_blob; /* a plane, as a blob in a memfd */
+    uint8_t canary_id[PEN_ID_BYTES];
+
+    bool draining;                       /* atomic */
+    uint32_t uploads;                    /* atomic: under way */
+    uint64_t bytes_received, bytes_sent; /* atomic, public listener */
+
+    pthread_mutex_t canary_lock; /* guards the two below */
+    uint64_t canary_ns;          /* when the canary was last rendered; 0: never */
+    bool canary_failed;
+};
+
+static inline bool service_is_draining(const struct service *service)
+{
+    return __atomic_load_n(&service->draining, __ATOMIC_ACQUIRE);
+}

@@ -1,0 +1,203 @@
+/* The life of a request: the table of its steps, and what all calls have in common. */
+#include "protocol/fnv.h"
+#include "protocol/memory.h"
+#include "server/base/clock.h"
+#include "server/base/log.h"
+#include "server/routes/routes.h"
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static enum step_end find(struct call *call, struct pen_error *error);
+static enum step_end authorise(struct call *call, struct pen_error *error);
+static enum step_end admit(struct call *call, struct pen_error *error);
+static enum step_end receive(struct call *call, struct pen_error *error);
+static enum step_end handle(struct call *call, struct pen_error *error);
+static enum step_end settle(struct call *call, struct pen_error *error);
+static enum step_end record(struct call *call, struct pen_error *error);
+static enum step_end bury(struct call *call, struct pen_error *error);
+
+static const struct step life[] = {
+    /* The header is there, and properly framed. */
+    {"find", find},           /* the address; answers OPTIONS of other origins */
+    {"authorise", authorise}, /* the token, and whose share it uses */
+    {"admit", admit},         /* the body: of the right type and size, an upload finds a place */
+    {"receive", receive},     /* waits for the last byte of the body */
+    /* The whole request is there. */
+    {"handle", handle}, /* the row's handler answers, or waits in steps of its own (render.c,
+                           compare.c, store.c) for a worker or an importer */
+};
+static const struct step after_life[] = {
+    /* The answer is out, or the client is lost. */
+    {"settle", settle}, /* gives back shares, places and memory */
+    {"record", record}, /* metrics and the log */
+    {"bury", bury},
+};
+
+static bool (*const handlers[PEN_ROUTES])(struct call *call, struct pen_error *error) = {
+#define ENDPOINT(id, ...) [PEN_ROUTE_##id] = route_##id,
+#include "protocol/endpoints.def"
+};
+
+static enum step_end find(struct call *call, struct pen_error *error)
+{
+    struct http_exchange *x = call->exchange;
+    char allow[64];
+    if (pen_route_find(x->method, x->path, &call->address)) {
+        call->label = call->address.route->pattern;
+        return STEP_NEXT;
+    }
+    if (!call->address.methods) {
+        pen_fail(error, PEN_NOT_FOUND, "", "There is nothing at this address.");
+        return STEP_FAILED;
+    }
+    call->label = pen_routes[__builtin_ctzll(call->address.methods)].pattern;
+    pen_route_allow(call->address.methods, allow, sizeof allow);
+    if (!strcmp(x->method, "OPTIONS") && *call->service->config->cors_origin) {
+        http_add_header(x, "Access-Control-Allow-Methods", "%s", allow);
+        http_add_header(x, "Access-Control-Allow-Headers",
+            "Authorization, Content-Type, If-None-Match, Prefer, traceparent");
+        http_add_header(x, "Access-Control-Max-Age", "600");
+        http_answer(x, 204, NULL, http_static(NULL, 0));
+        return STEP_OVER;
+    }
+    http_add_header(x, "Allow", "%s", allow);
+    pen_fail(error, PEN_METHOD_NOT_ALLOWED, "", "This address takes %s.", allow);
+    return STEP_FAILED;
+}
+
+static enum step_end authorise(struct call *call, struct pen_error *error)
+{
+    const struct service *s = call->service;
+    const char *from = call->exchange->client;
+    call->client = pen_fnv(PEN_FNV_START, from, strlen(from)) | 1ull << 63; /* without a token */
+    if (!s->auth)
+        return STEP_NEXT;
+    uint32_t token = auth_check(s->auth, http_header(call->exchange, "Authorization"));
+    if (token)
+        call->client = token;
+    if (token || call->address.route->flags & PEN_ROUTE_OPEN)
+        return STEP_NEXT;
+    pen_fail(error, PEN_UNAUTHORIZED, "", "This address needs a bearer token.");
+    return STEP_FAILED;
+}
+
+static enum step_end admit(struct call *call, struct pen_error *error)
+{
+    enum pen_body takes = (enum pen_body)call->address.route->takes;
+    return body_open(&call->body, call->service, takes, call->exchange, error) ? STEP_NEXT
+                                                                               : STEP_FAILED;
+}
+
+static enum step_end receive(struct call *call, struct pen_error *error)
+{
+    (void)call, (void)error;
+    return STEP_OVER; /* end() resumes it */
+}
+
+static enum step_end handle(struct call *call, struct pen_error *error)
+{
+    return handlers[call->address.route->id](call, error) ? STEP_OVER : STEP_FAILED;
+}
+
+static enum step_end settle(struct call *call, struct pen_error *error)
+{
+    (void)error;
+    if (call->end_work)
+        call->end_work(call, call->work);
+    free(call->work);
+    body_finish(&call->body, call->service);
+    return STEP_NEXT;
+}
+
+static enum step_end record(struct call *call, struct pen_error *error)
+{
+    (void)error;
+    struct service *s = call->service;
+    const struct http_exchange *x = call->exchange;
+    const struct call_note *note = &call->note;
+    double ms = clock_ms(clock_now_ns() - x->header_ns);
+    __atomic_add_fetch(&s->bytes_sent, x->body.size, __ATOMIC_RELAXED);
+    metrics_request(s->metrics, call->label, x->status, ms);
+    struct log_request line = {.listener = "public",
+        .request_id = x->request_id,
+        .trace_id = *call->trace.id ? call->trace.id : NULL,
+        .client = x->client,
+        .method = x->method,
+        .target = x->path,
+        .status = x->status,
+        .bytes = x->body.size,
+        .ms = ms,
+        .technique = note->technique,
+        .queue_ms = note->queue_ms,
+        .render_ms = note->render_ms,
+        .cached = note->cached,
+        .code = note->code,
+        .error = *note->error ? note->error : NULL,
+        .aborted = x->aborted};
+    log_write_request(&line);
+    return STEP_NEXT;
+}
+
+static enum step_end bury(struct call *call, struct pen_error *error)
+{
+    (void)error;
+    free(call);
+    return STEP_OVER;
+}
+
+/* ---- the listener's callbacks ---- */
+
+/* Headers that every answer has. */
+static void add_common(struct call *call)
+{
+    struct http_exchange *x = call->exchange;
+    const char *origin = call->service->config->cors_origin;
+    http_add_header(x, "X-Request-Id", "%s", x->request_id);
+    http_add_header(x, "X-Content-Type-Options", "nosniff");
+    if (*call->trace.id) {
+        char text[HTTP_TRACE_BYTES];
+        http_trace_answer(&call->trace, text);
+        http_add_header(x, "traceparent", "%s", text);
+    }
+    if (*origin) {
+        http_add_header(x, "Access-Control-Allow-Origin", "%s", origin);
+        http_add_header(x, "Access-Control-Expose-Headers",
+            "ETag, Server-Timing, Location, Retry-After, X-Request-Id, Content-Location, "
+            "X-Penumbra-Choice, X-Penumbra-Warning");
+    }
+}
+
+static void begin(struct http_exchange *x, const struct pen_error *framing)
+{
+    struct call *call = pen_alloc_zero(1, sizeof *call);
+    x->user = call;
+    call->service = http_listener_context(x->listener);
+    call->exchange = x;
+    call->label = "other";
+    call->next = life;
+    http_trace_read(&call->trace, http_header(x, "traceparent"));
+    add_common(call);
+    call_resume(call, framing);
+}
+
+static void body(struct http_exchange *x, const void *data, size_t bytes)
+{
+    struct call *call = x->user;
+    struct pen_error error = {0};
+    __atomic_add_fetch(&call->service->bytes_received, bytes, __ATOMIC_RELAXED);
+    if (!body_add(&call->body, data, bytes, &error))
+        call_resume(call, &error);
+}
+
+static void end(struct http_exchange *x)
+{
+    call_resume(x->user, NULL);
+}
+
+static void completed(struct http_exchange *x)
+{
+    call_run(x->user, after_life, NULL);
+}
+
+const struct http_callbacks routes_callbacks = {begin, body, end, completed};

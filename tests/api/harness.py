@@ -13,6 +13,9 @@ import sys
 import tempfile
 import time
 import unittest
+import zlib
+
+import schema
 
 BIN = os.environ.get("PENUMBRA_BIN") or os.path.join(os.path.dirname(__file__), "../../build/dev/bin")
 # Sanitizers slow everything down, and so does a busy machine; limits that count time are widened.
@@ -34,6 +37,8 @@ class Answer:
 
 
 class Daemon:
+    contract = None  # the OpenAPI document, from the first daemon: all are of one build
+
     def __init__(self, *flags, store=None, env=None, start=True):
         self.folder = tempfile.mkdtemp(prefix="penumbra-test-")
         self.store = store or os.path.join(self.folder, "store")
@@ -65,6 +70,8 @@ class Daemon:
             self.process.wait(20)
             raise RuntimeError("the daemon did not start: " + self.log())
         self.port, self.admin_port = int(match[2]), int(match[4])
+        if not Daemon.contract and line.startswith("penumbrad") and "http://" in line.split()[4]:
+            Daemon.contract = schema.Document(self.exchange("GET", "/openapi.json").json())
         return self
 
     def log(self):
@@ -72,6 +79,13 @@ class Daemon:
             return log.read()
 
     def call(self, method, path, body=None, headers=None, port=None, timeout=60):
+        """The answer, once it is what the OpenAPI document says."""
+        answer = self.exchange(method, path, body, headers, port, timeout)
+        if (port or self.port) == self.port and Daemon.contract:
+            Daemon.contract.check(method, path, answer)
+        return answer
+
+    def exchange(self, method, path, body=None, headers=None, port=None, timeout=60):
         connection = http.client.HTTPConnection("127.0.0.1", port or self.port,
                                                 timeout=timeout * SLOW)
         try:
@@ -215,6 +229,15 @@ def grid_scene(n=1, name="grid"):
             {"buffer": 0, "byteOffset": 0, "byteLength": len(vertex)},
             {"buffer": 0, "byteOffset": len(vertex), "byteLength": len(index)}],
         "buffers": [{"byteLength": len(vertex) + len(index)}]}, vertex + index)
+
+
+def png(width, height):
+    rows = b"".join(b"\0" + bytes(v for x in range(width) for v in (x % 256, y % 256, 90))
+                    for y in range(height))
+    chunk = lambda kind, data: (struct.pack(">I", len(data)) + kind + data +
+                                struct.pack(">I", zlib.crc32(kind + data)))
+    return (b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)) +
+            chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b""))
 
 
 SMALL = {"technique": {"name": "hard"}, "width": 64, "height": 48}

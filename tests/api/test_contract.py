@@ -3,10 +3,11 @@ import hashlib
 import http.client
 import json
 import re
+import sys
 import unittest
 
 import harness
-from harness import SMALL, Daemon, grid_scene
+from harness import SMALL, Daemon, grid_scene, png
 
 
 class Contract(unittest.TestCase):
@@ -21,6 +22,9 @@ class Contract(unittest.TestCase):
         status = cls.d.stop()
         assert status == 0, status
         cls.d.kill()
+        if len(sys.argv) == 1:  # all tests were run
+            never = Daemon.contract.operations - Daemon.contract.seen
+            assert not never, "never called: %s" % sorted(never)
 
     def problem(self, answer, status, pointer=None):
         self.assertEqual(answer.status, status, answer.body)
@@ -68,6 +72,19 @@ class Contract(unittest.TestCase):
         for name in names:
             self.assertEqual(self.d.get("/v1/techniques/" + name).json()["name"], name)
         self.problem(self.d.get("/v1/techniques/nothing-like-it"), 404)
+
+    def test_answers_are_held_against_the_contract(self):
+        contract = Daemon.contract
+        answer = self.d.get("/v1/scenes/" + self.id)
+        for wrong in ({"extra": 1}, {"id": "x"}, {"bounds": {}}, {"triangles": "32"}):
+            lie = harness.Answer(200, answer.headers, json.dumps({**answer.json(), **wrong}))
+            with self.assertRaises(AssertionError, msg=wrong):
+                contract.check("GET", "/v1/scenes/" + self.id, lie)
+        less = {k: v for k, v in answer.json().items() if k != "warnings"}
+        for status, body in ((200, less), (202, answer.json()), (404, answer.json())):
+            with self.assertRaises(AssertionError):
+                contract.check("GET", "/v1/scenes/" + self.id,
+                               harness.Answer(status, answer.headers, json.dumps(body)))
 
     def test_contract_lists_every_address_it_serves(self):
         paths = self.d.get("/openapi.json").json()["paths"]
@@ -164,6 +181,16 @@ class Contract(unittest.TestCase):
         self.problem(post(b"x", "multipart/form-data; boundary=b"), 400)
         self.assertEqual(self.d.leftovers(), [])
 
+    def test_images(self):
+        data = png(5, 4)
+        path, kind = "/v1/images/" + hashlib.sha256(data).hexdigest(), {"Content-Type": "image/png"}
+        self.assertEqual(self.d.call("PUT", path, data, kind).status, 201)
+        self.assertEqual(self.d.call("POST", "/v1/images", data, kind).status, 200)
+        self.assertEqual(self.d.get(path).json()["width"], 5)
+        self.assertIn(self.d.get(path).json(), self.d.get("/v1/images").json()["images"])
+        self.assertEqual(self.d.call("DELETE", path).status, 204)
+        self.problem(self.d.get(path), 404)
+
     # ---- renders ----
 
     def test_image_and_headers(self):
@@ -187,6 +214,17 @@ class Contract(unittest.TestCase):
         empty = self.d.call("POST", "/v1/scenes/%s/render?width=3" % self.id, b"{}",
                             {"Content-Type": "application/json"})
         self.problem(empty, 400)
+
+    def test_comparison(self):
+        asked = {"width": 48, "height": 36, "techniques": ["hard"],
+                 "reference": {"name": "multisample", "params": {"samples": 16}}}
+        answer = self.d.call("POST", "/v1/scenes/%s/compare" % self.id, json.dumps(asked),
+                             {"Content-Type": "application/json"})
+        self.assertEqual(answer.status, 200, answer.body)
+        method, = answer.json()["methods"]
+        self.assertIn("rmse", method)
+        for link in method["links"].values():
+            self.assertEqual(self.d.get(link).status, 200)
 
     def test_conditional(self):
         path = "/v1/scenes/%s/render?technique=none&width=40&height=30" % self.id

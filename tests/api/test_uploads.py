@@ -10,7 +10,7 @@ import zipfile
 import zlib
 
 import harness
-from harness import SMALL, SLOW, Daemon, grid_scene, raw, wait
+from harness import SMALL, SLOW, Daemon, grid_scene, png, raw, wait
 
 try:
     import hostile_files
@@ -42,15 +42,6 @@ def gltf_with_buffer(name="mesh.bin"):
                 "bufferViews": [{"buffer": 0, "byteLength": 36}],
                 "buffers": [{"byteLength": 36, "uri": name}]}
     return json.dumps(document).encode(), binary
-
-
-def png(width, height):
-    rows = b"".join(b"\0" + bytes(v for x in range(width) for v in (x % 256, y % 256, 90))
-                    for y in range(height))
-    chunk = lambda kind, data: (struct.pack(">I", len(data)) + kind + data +
-                                struct.pack(">I", zlib.crc32(kind + data)))
-    return (b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)) +
-            chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b""))
 
 
 class Uploads(unittest.TestCase):

@@ -43,6 +43,10 @@ RULES = [
       "renderer/import/bundle.h", "renderer/metrics/*.h"],
      ["cjson/cJSON.h", "curl/*", "zip.h", "openssl/*"], "sockets"),
 ]
+# The floors inside server/, from below; the last are the files directly in it. A file may include
+# what lies in its own folder or on a floor below, not its neighbours on the same floor.
+SERVER_FLOORS = [["base"], ["http", "store", "pages"], ["queue"], ["workers"], ["auto"], ["routes"],
+                 [""]]
 # Tests may look into everything, and compare with other libraries.
 FREE = r"tests/.*"
 # No part of the renderer may know of these, whatever the table says. The importer, a program of its
@@ -61,6 +65,27 @@ def system_allowed(header, kind):
     if name in SOCKETS:
         return kind == "sockets"
     return name in SYSTEM or name.startswith(("sys/", "linux/", "asm/"))
+
+
+def floor_of(name, tree_name, floors):
+    """Number of the floor and folder, or None for what lies elsewhere."""
+    if not name.startswith(tree_name + "/"):
+        return None
+    folder = name[len(tree_name) + 1:].rpartition("/")[0]
+    for number, folders in enumerate(floors):
+        if folder in folders:
+            return number, folder
+    return len(floors), folder
+
+
+def check_floor(name, line, header, tree_name, floors, problems):
+    own, other = (floor_of(n, tree_name, floors) for n in (name, header))
+    if not own or not other:
+        return
+    if len(floors) in (own[0], other[0]):
+        problems.append("%s:%d: %s or %s is on no floor" % (name, line, own[1], other[1]))
+    elif own[1] != other[1] and other[0] >= own[0]:
+        problems.append("%s:%d: %s lies on no floor below" % (name, line, header))
 
 
 def check_include(name, line, quoted, header, problems):
@@ -102,6 +127,7 @@ def main():
             if found[2] == "microhttpd.h" and not name.startswith("tests/"):
                 users_of_microhttpd.add(name)
             check_include(name, number, found[1] == '"', found[2], problems)
+            check_floor(name, number, found[2], "server", SERVER_FLOORS, problems)
     if len(users_of_microhttpd) > 1:
         problems.append("microhttpd.h is included by more than one file: %s" %
                         ", ".join(sorted(users_of_microhttpd)))

@@ -1,4 +1,5 @@
 #include "server/base/config.h"
+#include "protocol/json_suggest.h"
 #include "renderer/renderer.h"
 #include <ctype.h>
 #include <errno.h>
@@ -11,6 +12,7 @@ enum kind { KIND_TEXT, KIND_NUMBER, KIND_SIZE, KIND_FLAG, KIND_CHOICE };
 struct row {
     const char *name; /* the C field: its flag has dashes, its variable capitals */
     const char *help;
+    const char *form; /* what the value looks like; NULL: as its kind says */
     const char *const *choices;
     const char *def;
     uint64_t min, max;
@@ -28,14 +30,18 @@ static const char *const log_format_names[] = {"text", "json", NULL};
         .name = #field, .def = default_text, .offset = offsetof(struct config, field),             \
         .kind = KIND_OF(((struct config *)0)->field), __VA_ARGS__                                  \
     }
-#define TIME .min = 1, .max = 86400000
+#define TIME .form = "MS", .min = 1, .max = 86400000
 #define SIZE .max = 1ull << 50
+#define ADDRESS .form = "ADDRESS:PORT"
+#define FILE_NAME .form = "FILE"
 
 static const struct row rows[] = {
-    ROW(listen, "127.0.0.1:8080", .help = "Address and port of the public listener; port 0: any."),
-    ROW(admin_listen, "127.0.0.1:8081",
+    ROW(listen, "127.0.0.1:8080", ADDRESS,
+        .help = "Address and port of the public listener; port 0: any."),
+    ROW(admin_listen, "127.0.0.1:8081", ADDRESS,
         .help = "Address and port of /livez, /readyz and /metrics, which ask for no token."),
-    ROW(store, "penumbra-store", .help = "Folder of the stored scenes and images."),
+    ROW(store, "penumbra-store", .form = "FOLDER",
+        .help = "Folder of the stored scenes and images."),
     ROW(device, "auto", .choices = pen_device_choice_names, .help = "Kind of device to render on."),
     ROW(device_index, "0", .max = 63,
         .help = "First GPU to use; further workers take the following ones."),
@@ -54,7 +60,7 @@ static const struct row rows[] = {
     ROW(hang_timeout_ms, "120000", TIME,
         .help = "A render that is past its deadline and this old is ended with its worker."),
     ROW(canary_interval_ms, "5000", TIME, .help = "How long /readyz trusts its last test render."),
-    ROW(quarantine_s, "600", .max = 86400,
+    ROW(quarantine_s, "600", .form = "SECONDS", .max = 86400,
         .help = "How long a scene that ended two workers is refused."),
     ROW(connections, "512", .min = 4, .max = 60000, .help = "Public connections; beyond it 503."),
     ROW(connections_per_address, "256", .min = 1, .max = 60000,
@@ -68,17 +74,20 @@ static const struct row rows[] = {
     ROW(uploads, "16", .min = 1, .max = 1024, .help = "Uploads at a time; beyond it 503."),
     ROW(imports, "2", .min = 1, .max = 64, .help = "Importer processes at a time."),
     ROW(import_timeout_ms, "120000", TIME, .help = "Wall-clock limit of one import."),
-    ROW(import_cpu_seconds, "60", .min = 1, .max = 86400, .help = "Processor limit of one import."),
+    ROW(import_cpu_seconds, "60", .form = "SECONDS", .min = 1, .max = 86400,
+        .help = "Processor limit of one import."),
     ROW(import_memory, "2G", SIZE, .min = 1 << 20, .help = "Memory limit of one import."),
     ROW(drain_timeout_ms, "60000", TIME,
         .help = "On SIGTERM, how long accepted requests may take to be answered."),
-    ROW(token_file, "", .help = "Bearer tokens, one a line, \"name token\" or \"token\"."),
-    ROW(tls_cert, "", .help = "Certificate chain of the public listener, PEM."),
-    ROW(tls_key, "", .help = "Its private key, PEM."),
+    ROW(token_file, "", FILE_NAME,
+        .help = "Bearer tokens, one a line, \"name token\" or \"token\"."),
+    ROW(tls_cert, "", FILE_NAME, .help = "Certificate chain of the public listener, PEM."),
+    ROW(tls_key, "", FILE_NAME, .help = "Its private key, PEM."),
     ROW(insecure, "off", .help = "Listen beyond loopback without tokens."),
-    ROW(cors_origin, "", .help = "Origin that pages may call from, or *; empty: none."),
-    ROW(worker_path, "", .help = "penumbra-worker; empty: next to penumbrad."),
-    ROW(import_path, "", .help = "penumbra-import; empty: next to penumbrad."),
+    ROW(cors_origin, "", .form = "ORIGIN",
+        .help = "Origin that pages may call from, or *; empty: none."),
+    ROW(worker_path, "", FILE_NAME, .help = "penumbra-worker; empty: next to penumbrad."),
+    ROW(import_path, "", FILE_NAME, .help = "penumbra-import; empty: next to penumbrad."),
     ROW(log_format, "text", .choices = log_format_names, .help = "Form of the log, on stderr."),
 };
 #define ROWS (sizeof rows / sizeof *rows)
@@ -117,6 +126,41 @@ static bool parse_number(const struct row *row, const char *text, uint64_t *valu
     return *end == 0;
 }
 
+/* "8", "16K", "1G": as short as the flag takes it. */
+static void print_number(const struct row *row, uint64_t value, char text[24])
+{
+    int unit = 0;
+    while (row->kind == KIND_SIZE && value && !(value & 1023) && unit < 3) {
+        value >>= 10;
+        unit++;
+    }
+    snprintf(text, 24, "%llu%.1s", (unsigned long long)value, &"\0KMG"[unit]);
+}
+
+static bool fail_range(
+    const struct row *row, const char *source, const char *text, struct pen_error *error)
+{
+    char min[24], max[24];
+    print_number(row, row->min, min);
+    print_number(row, row->max, max);
+    return pen_fail(error, PEN_INVALID, "",
+        "%s must be a whole number from %s to %s%s, not \"%.40s\".", source, min, max,
+        row->kind == KIND_SIZE ? ", of bytes or with K, M or G" : "", text);
+}
+
+static bool fail_choice(
+    const struct row *row, const char *source, const char *text, struct pen_error *error)
+{
+    char list[128] = "";
+    for (int c = 0; row->choices[c]; c++)
+        snprintf(list + strlen(list), sizeof list - strlen(list), "%s%s",
+            !c                    ? ""
+            : row->choices[c + 1] ? ", "
+                                  : " or ",
+            row->choices[c]);
+    return pen_fail(error, PEN_INVALID, "", "%s must be %s, not \"%.40s\".", source, list, text);
+}
+
 static bool store(const struct row *row, struct config *config, const char *text,
     const char *source, struct pen_error *error)
 {
@@ -132,10 +176,7 @@ static bool store(const struct row *row, struct config *config, const char *text
     case KIND_NUMBER:
     case KIND_SIZE:
         if (!parse_number(row, text, &number) || number < row->min || number > row->max)
-            return pen_fail(error, PEN_INVALID, "",
-                "%s must be a whole number from %llu to %llu%s, not \"%.40s\".", source,
-                (unsigned long long)row->min, (unsigned long long)row->max,
-                row->kind == KIND_SIZE ? ", with K, M or G if you like" : "", text);
+            return fail_range(row, source, text, error);
         if (row->kind == KIND_SIZE)
             ((config_size *)at)->bytes = number;
         else
@@ -147,12 +188,13 @@ static bool store(const struct row *row, struct config *config, const char *text
         else if (!strcmp(text, "0") || !strcmp(text, "off") || !strcmp(text, "false"))
             ((config_flag *)at)->on = false;
         else
-            return pen_fail(error, PEN_INVALID, "", "%s must be on or off.", source);
+            return pen_fail(
+                error, PEN_INVALID, "", "%s must be on or off, not \"%.40s\".", source, text);
         return true;
     default:
         index = pen_choice_index(row->choices, text);
         if (index < 0)
-            return pen_fail(error, PEN_INVALID, "", "%s has no choice \"%.40s\".", source, text);
+            return fail_choice(row, source, text, error);
         ((config_choice *)at)->index = (uint32_t)index;
         return true;
     }
@@ -172,6 +214,23 @@ static const struct row *find_flag(const char *argument, const char **value)
     return NULL;
 }
 
+/* What to say of an argument that is no setting. */
+static bool fail_flag(const char *argument, struct pen_error *error)
+{
+    char names[ROWS][64], given[64], end[96];
+    struct pen_suggestion suggestion = {.word = given};
+    if (*argument != '-')
+        return pen_fail(error, PEN_INVALID, "",
+            "\"%.60s\" is no setting: they look like --queue-limit 64; see --help.", argument);
+    snprintf(given, sizeof given, "%.*s", (int)strcspn(argument, "="), argument);
+    for (size_t r = 0; r < ROWS; r++) {
+        flag_name(&rows[r], names[r]);
+        pen_suggest(&suggestion, names[r]);
+    }
+    return pen_fail(error, PEN_INVALID, "", "There is no setting %s%s", given,
+        pen_suggest_end(&suggestion, end, sizeof end));
+}
+
 bool config_read(struct config *config, int argc, char **argv, struct pen_error *error)
 {
     memset(config, 0, sizeof *config);
@@ -187,14 +246,14 @@ bool config_read(struct config *config, int argc, char **argv, struct pen_error 
         const char *value;
         const struct row *row = find_flag(argv[i], &value);
         if (!row)
-            return pen_fail(
-                error, PEN_INVALID, "", "There is no setting %.60s; see --help.", argv[i]);
+            return fail_flag(argv[i], error);
         char name[64];
         flag_name(row, name);
-        if (!value && row->kind == KIND_FLAG)
+        bool follows = i + 1 < argc && strncmp(argv[i + 1], "--", 2);
+        if (!value && follows)
+            value = argv[++i];
+        else if (!value && row->kind == KIND_FLAG)
             value = "on";
-        else if (!value && ++i < argc)
-            value = argv[i];
         if (!value)
             return pen_fail(error, PEN_INVALID, "", "%s needs a value.", name);
         if (!store(row, config, value, name, error))
@@ -203,6 +262,28 @@ bool config_read(struct config *config, int argc, char **argv, struct pen_error 
     if (!*config->tls_cert != !*config->tls_key)
         return pen_fail(error, PEN_INVALID, "", "--tls-cert and --tls-key go together.");
     return true;
+}
+
+/* "  --queue-limit N", and its help below. */
+static void print_help(const struct row *row)
+{
+    static const char *const forms[] = {[KIND_TEXT] = "TEXT",
+        [KIND_NUMBER] = "N",
+        [KIND_SIZE] = "SIZE",
+        [KIND_FLAG] = "on|off",
+        [KIND_CHOICE] = ""};
+    char name[64], min[24], max[24];
+    flag_name(row, name);
+    printf("  %s %s", name, row->form ? row->form : forms[row->kind]);
+    for (int c = 0; row->choices && row->choices[c]; c++)
+        printf("%s%s", c ? "|" : "", row->choices[c]);
+    printf("\n      %s", row->help);
+    if (row->kind == KIND_NUMBER || row->kind == KIND_SIZE) {
+        print_number(row, row->min, min);
+        print_number(row, row->max, max);
+        printf(" %s to %s.", min, max);
+    }
+    printf(" [%s]\n", row->def);
 }
 
 bool config_answer_help(int argc, char **argv)
@@ -215,16 +296,12 @@ bool config_answer_help(int argc, char **argv)
         if (strcmp(argv[i], "--help"))
             continue;
         printf("penumbrad %s: renders soft shadows over HTTP.\n\n"
-               "Every flag is also a variable: --queue-limit is PENUMBRA_QUEUE_LIMIT.\n\n",
+               "--flag value and --flag=value are the same, an on|off flag alone means on, and\n"
+               "every flag is also a variable: --queue-limit is PENUMBRA_QUEUE_LIMIT. SIZE is in\n"
+               "bytes, or with K, M or G; MS are milliseconds. Defaults stand in brackets.\n\n",
             PENUMBRA_VERSION);
-        for (size_t r = 0; r < ROWS; r++) {
-            char name[64];
-            flag_name(&rows[r], name);
-            printf("  %-27s %s", name, rows[r].help);
-            for (int c = 0; rows[r].choices && rows[r].choices[c]; c++)
-                printf("%s%s", c ? ", " : " One of ", rows[r].choices[c]);
-            printf(" [%s]\n", rows[r].def);
-        }
+        for (size_t r = 0; r < ROWS; r++)
+            print_help(&rows[r]);
         return true;
     }
     return false;

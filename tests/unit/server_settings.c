@@ -31,6 +31,8 @@ static void test_config(void)
     CHECK(c.queue_limit == 9 && c.require_gpu.on && c.gpu_memory.bytes == 3ull << 30);
     CHECK(read_flags(&c, "--store", "x=y", "--require-gpu=off"));
     CHECK_STR(c.store, "x=y");
+    CHECK(read_flags(&c, "--warm-up", "off", "--require-gpu") && !c.warm_up.on && c.require_gpu.on);
+    CHECK(read_flags(&c, "--require-gpu", "--warm-up", "on") && c.warm_up.on && c.require_gpu.on);
     setenv("PENUMBRA_QUEUE_LIMIT", "11", 1);
     setenv("PENUMBRA_REQUIRE_GPU", "on", 1);
     CHECK(read_flags(&c, "--require-gpu=off", NULL, NULL));
@@ -46,6 +48,22 @@ static void test_config(void)
         "--require-gpu=perhaps", "--queue-limit=99999999999999999999"};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
         CHECK(!read_flags(&c, bad[i], NULL, NULL));
+    static const struct {
+        const char *flag, *value, *message;
+    } told[] = {{"--require-gpu", "perhaps", "--require-gpu must be on or off, not \"perhaps\"."},
+        {"--queue-limt", "3", "There is no setting --queue-limt; did you mean \"--queue-limit\"?"},
+        {"--queue-limit", "--workers", "--queue-limit needs a value."},
+        {"--log-format", "xml", "--log-format must be text or json, not \"xml\"."},
+        {"--import-memory", "1K",
+            "--import-memory must be a whole number from 1M to 1048576G, of bytes or with K, M or "
+            "G, not \"1K\"."},
+        {"80", NULL, "\"80\" is no setting: they look like --queue-limit 64; see --help."}};
+    for (size_t i = 0; i < sizeof told / sizeof *told; i++) {
+        char *argv[] = {"penumbrad", (char *)told[i].flag, (char *)told[i].value, NULL};
+        struct pen_error error = {0};
+        CHECK(!config_read(&c, told[i].value ? 3 : 2, argv, &error));
+        CHECK_STR(error.message, told[i].message);
+    }
 }
 
 static void test_accept(void)

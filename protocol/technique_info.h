@@ -15,7 +15,12 @@ struct pen_technique_info {
     bool textured;         /* rgb of its visibility follows the emission texture */
     uint32_t struct_size;  /* bytes of its parameter struct, at most PEN_TECHNIQUE_PARAM_BYTES */
     struct pen_param_table params;
+    /* What is worth measuring when the choice of a method is left open: settings as "name=value"
+     * pairs, "" for the defaults; ended by NULL. NULL: this method is not taken then. */
+    const char *const *candidates;
+    bool candidates_need_gpu; /* in software they would take minutes */
 };
+#define PEN_CANDIDATES(...) ((const char *const[]){__VA_ARGS__, NULL})
 
 struct pen_catalogue {
     const struct pen_technique_info *const *items;

@@ -54,6 +54,7 @@ const struct technique technique_backprojection = {
             "light's centre sees.",
         .cost_class = PEN_COST_HEAVY,
         .textured = true,
+        .candidates = PEN_CANDIDATES(""),
         .struct_size = sizeof(struct backprojection),
         .params = {rows, sizeof rows / sizeof *rows}},
     .record = record,

@@ -45,6 +45,7 @@ const struct technique technique_bilateral = {
                      "of the penumbra where it is wider.",
         .cost_class = PEN_COST_HEAVY,
         .textured = true,
+        .candidates = PEN_CANDIDATES(""),
         .struct_size = sizeof(struct bilateral),
         .params = {rows, sizeof rows / sizeof *rows}},
     .counts_horizon = true,

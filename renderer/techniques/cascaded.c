@@ -298,6 +298,7 @@ const struct technique technique_cascaded = {
                      "are drawn again when the camera moves.",
         .cost_class = PEN_COST_HEAVY,
         .textured = true,
+        .candidates = PEN_CANDIDATES(""),
         .struct_size = sizeof(struct cascaded),
         .params = {rows, sizeof rows / sizeof *rows}},
     .state_size = sizeof(struct state),

@@ -29,6 +29,7 @@ const struct technique technique_hard = {
         .artefacts = "Hard, jagged edges whatever the size of the light.",
         .cost_class = PEN_COST_CHEAP,
         .textured = false,
+        .candidates = PEN_CANDIDATES(""),
         .struct_size = sizeof(struct hard),
         .params = {rows, sizeof rows / sizeof *rows}},
     .record = record,

@@ -66,6 +66,7 @@ const struct technique technique_mssm = {
                      "contacts on sloped receivers brighten; square kernels.",
         .cost_class = PEN_COST_MEDIUM,
         .textured = false,
+        .candidates = PEN_CANDIDATES(""),
         .struct_size = sizeof(struct mssm),
         .params = {rows, sizeof rows / sizeof *rows}},
     .record = record,

@@ -85,6 +85,8 @@ const struct technique technique_multisample = {
         .artefacts = "Bands at few samples; texels of each map; cost grows with the samples.",
         .cost_class = PEN_COST_REFERENCE,
         .textured = true,
+        .candidates = PEN_CANDIDATES("samples=64", "samples=256"),
+        .candidates_need_gpu = true,
         .struct_size = sizeof(struct multisample),
         .params = {rows, sizeof rows / sizeof *rows}},
     .counts_horizon = true,

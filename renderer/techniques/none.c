@@ -13,6 +13,7 @@ const struct technique technique_none = {
         .summary = "Every receiver sees the whole light; the baseline of cost and of images.",
         .citation = "-",
         .artefacts = "No shadows at all.",
+        .candidates = PEN_CANDIDATES(""),
         .cost_class = PEN_COST_CHEAP,
         .textured = false},
     .record = record,

@@ -46,6 +46,7 @@ const struct technique technique_pcf = {
                      "distances; few taps show as bands.",
         .cost_class = PEN_COST_CHEAP,
         .textured = false,
+        .candidates = PEN_CANDIDATES(""),
         .struct_size = sizeof(struct pcf),
         .params = {rows, sizeof rows / sizeof *rows}},
     .record = record,

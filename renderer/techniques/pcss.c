@@ -56,6 +56,7 @@ const struct technique technique_pcss = {
                      "by the search; seen from the centre of the light only.",
         .cost_class = PEN_COST_MEDIUM,
         .textured = false,
+        .candidates = PEN_CANDIDATES("", "search_taps=32 filter_taps=64"),
         .struct_size = sizeof(struct pcss),
         .params = {rows, sizeof rows / sizeof *rows}},
     .record = record,

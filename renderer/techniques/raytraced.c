@@ -110,6 +110,8 @@ const struct technique technique_raytraced = {
                      "terminator.",
         .cost_class = PEN_COST_REFERENCE,
         .textured = true,
+        .candidates =
+            PEN_CANDIDATES("samples=16 seed=1", "samples=64 seed=1", "samples=256 seed=1"),
         .struct_size = sizeof(struct raytraced),
         .params = {rows, sizeof rows / sizeof *rows}},
     .counts_horizon = true,

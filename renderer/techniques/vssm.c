@@ -80,6 +80,7 @@ const struct technique technique_vssm = {
                      "square kernels; steps where split parts compare few depths.",
         .cost_class = PEN_COST_MEDIUM,
         .textured = false,
+        .candidates = PEN_CANDIDATES(""),
         .struct_size = sizeof(struct vssm),
         .params = {rows, sizeof rows / sizeof *rows}},
     .record = record,

@@ -97,8 +97,7 @@ static bool read_table(const cJSON *item, struct auto_table *table)
         row->rmse = number(at, "rmse");
         row->fixed_ms = number(at, "fixed_ms");
         row->screen_ms = number(at, "screen_ms");
-        table->count +=
-            row->rmse >= 0 && row->fixed_ms >= 0 && row->screen_ms >= 0 && auto_find(row->key);
+        table->count += row->rmse >= 0 && row->fixed_ms >= 0 && row->screen_ms >= 0;
     }
     return table->count > 0;
 }

@@ -43,70 +43,42 @@ const struct pen_catalogue *auto_catalogue(const struct pen_catalogue *catalogue
     return &with_auto;
 }
 
-/* From cheap to dear, a few of every class; the accurate ones last, so that something always meets
- * a sensible max_rmse. */
-const struct auto_candidate auto_candidates[] = {
-    {"none", {{0}}},
-    {"hard", {{0}}},
-    {"pcf", {{0}}},
-    {"pcss", {{0}}},
-    {"pcss", {{"search_taps", 32}, {"filter_taps", 64}}},
-    {"vssm", {{0}}},
-    {"mssm", {{0}}},
-    {"backprojection", {{0}}},
-    {"bilateral", {{0}}},
-    {"cascaded", {{0}}},
-    {"multisample", {{"samples", 64}}},
-    {"multisample", {{"samples", 256}}},
-    {"raytraced", {{"samples", 16}, {"seed", 1}}},
-    {"raytraced", {{"samples", 64}, {"seed", 1}}},
-    {"raytraced", {{"samples", 256}, {"seed", 1}}},
-};
-const uint32_t auto_candidate_count = sizeof auto_candidates / sizeof *auto_candidates;
-
-bool auto_is_candidate(const struct auto_candidate *candidate,
-    const struct pen_catalogue *catalogue, bool textured, bool software)
+uint32_t auto_candidates(const struct pen_catalogue *catalogue, bool textured, bool software,
+    char keys[AUTO_MAX_ROWS][AUTO_KEY_BYTES])
 {
-    const struct pen_technique_info *method = pen_catalogue_find(catalogue, candidate->technique);
-    bool has_traced = pen_catalogue_find(catalogue, "raytraced") != NULL;
-    bool draws_many_maps = !strcmp(candidate->technique, "multisample");
-    return method && (!textured || method->textured) &&
-           !(software && has_traced && draws_many_maps);
-}
-
-void auto_key(const struct auto_candidate *candidate, char key[AUTO_KEY_BYTES])
-{
-    int at = snprintf(key, AUTO_KEY_BYTES, "%s", candidate->technique);
-    for (int i = 0; i < 3 && candidate->settings[i].name && at < AUTO_KEY_BYTES; i++)
-        at += snprintf(key + at, (size_t)(AUTO_KEY_BYTES - at), " %s=%g",
-            candidate->settings[i].name, candidate->settings[i].value);
-}
-
-const struct auto_candidate *auto_find(const char *key)
-{
-    char own[AUTO_KEY_BYTES];
-    for (uint32_t i = 0; i < auto_candidate_count; i++) {
-        auto_key(&auto_candidates[i], own);
-        if (!strcmp(own, key))
-            return &auto_candidates[i];
+    uint32_t count = 0;
+    for (uint32_t m = 0; m < catalogue->count; m++) {
+        const struct pen_technique_info *method = catalogue->items[m];
+        if ((textured && !method->textured) || (software && method->candidates_need_gpu))
+            continue;
+        for (const char *const *at = method->candidates; at && *at && count < AUTO_MAX_ROWS; at++)
+            snprintf(keys[count++], AUTO_KEY_BYTES, "%s%s%s", method->name, **at ? " " : "", *at);
     }
-    return NULL;
+    return count;
 }
 
-void auto_apply(const struct auto_candidate *candidate, const struct pen_catalogue *catalogue,
-    struct pen_request *request)
+bool auto_apply(const char *key, const struct pen_catalogue *catalogue, struct pen_request *request)
 {
-    const struct pen_technique_info *method = pen_catalogue_find(catalogue, candidate->technique);
+    char copy[AUTO_KEY_BYTES], *rest = NULL;
+    snprintf(copy, sizeof copy, "%s", key);
+    const char *name = strtok_r(copy, " ", &rest);
+    const struct pen_technique_info *method = name ? pen_catalogue_find(catalogue, name) : NULL;
+    if (!method)
+        return false;
     memset(request->technique, 0, sizeof request->technique);
     memset(request->technique_params, 0, sizeof request->technique_params);
     memcpy(request->technique, method->name, strlen(method->name));
     pen_params_default(method->params, request->technique_params);
-    for (int i = 0; i < 3 && candidate->settings[i].name; i++) {
-        const struct pen_param *row = pen_param_find(method->params, candidate->settings[i].name);
-        if (row)
-            pen_param_store(
-                row, request->technique_params, &candidate->settings[i].value, "", NULL);
+    for (char *pair; (pair = strtok_r(NULL, " ", &rest));) {
+        char *value = strchr(pair, '=');
+        if (!value)
+            return false;
+        *value++ = 0;
+        const struct pen_param *row = pen_param_find(method->params, pair);
+        if (!row || !pen_param_parse(row, request->technique_params, value, "", NULL))
+            return false;
     }
+    return true;
 }
 
 double auto_predict(const struct auto_table *table, const struct auto_row *row, uint64_t pixels)

@@ -17,27 +17,15 @@ struct auto_wish {
 /* The catalogue with "auto" at its end. Call before the first thread. */
 const struct pen_catalogue *auto_catalogue(const struct pen_catalogue *catalogue);
 
-/* A method with settings; everything else is at its default. */
-struct auto_candidate {
-    const char *technique;
-    struct {
-        const char *name;
-        double value;
-    } settings[3];
-};
-extern const struct auto_candidate auto_candidates[];
-extern const uint32_t auto_candidate_count;
-
-/* Whether a candidate is worth measuring: this build has it, it can do coloured lights if there are
- * any, and it would not keep a software renderer busy for minutes. */
-bool auto_is_candidate(const struct auto_candidate *candidate,
-    const struct pen_catalogue *catalogue, bool textured, bool software);
-/* "pcss search_taps=32 filter_taps=64" */
-void auto_key(const struct auto_candidate *candidate, char key[AUTO_KEY_BYTES]);
-const struct auto_candidate *auto_find(const char *key); /* NULL: no such candidate */
-/* Puts the method and its settings into the request. */
-void auto_apply(const struct auto_candidate *candidate, const struct pen_catalogue *catalogue,
-    struct pen_request *request);
+/* The candidates of all methods that are worth measuring: those that can do coloured lights if there
+ * are any, and would not keep a software renderer busy for minutes. A key names a method and its
+ * settings, "pcss search_taps=32 filter_taps=64"; everything else is at its default. Returns how
+ * many there are. */
+uint32_t auto_candidates(const struct pen_catalogue *catalogue, bool textured, bool software,
+    char keys[AUTO_MAX_ROWS][AUTO_KEY_BYTES]);
+/* Puts the method and its settings into the request. False: it is the key of no candidate. */
+bool auto_apply(
+    const char *key, const struct pen_catalogue *catalogue, struct pen_request *request);
 
 /* What was measured of one candidate. */
 struct auto_row {

@@ -10,7 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define REFERENCE_SAMPLES 1024
+#define REFERENCE_SETTINGS "samples=1024"
 #define GPU_PIXELS (320u * 240u)      /* of the pictures whose error is measured */
 #define SOFTWARE_PIXELS (176u * 132u) /* the same, and of those that are timed */
 #define TIMED_PIXELS (2u << 20)       /* at most, on a GPU */
@@ -90,10 +90,10 @@ static bool take(struct auto_runs *runs, struct auto_render *render,
         table->rows[i].screen_ms *= factors[i];
     }
     memcpy(&wish, request->technique_params, sizeof wish);
-    if (!auto_choose(table, &wish, (uint64_t)request->width * request->height, &pick))
+    if (!auto_choose(table, &wish, (uint64_t)request->width * request->height, &pick) ||
+        !auto_apply(pick.row->key, runs->parts.catalogue, request))
         return pen_fail(
             error, PEN_INTERNAL, "/technique", "No method could be measured on this scene.");
-    auto_apply(auto_find(pick.row->key), runs->parts.catalogue, request);
     snprintf(render->why, sizeof render->why, "%s", pick.why);
     render->met = pick.met;
     render->expected = expected[pick.row - table->rows];
@@ -126,7 +126,7 @@ static void plan_probes(struct run *run, const struct pen_request *asked)
     if ((uint64_t)asked->width * asked->height <= run->table.pixels || !run->table.count)
         return;
     limit_pixels(&larger, PROBE_SCALE * run->table.pixels);
-    auto_apply(auto_find(run->table.rows[0].key), run->runs->parts.catalogue, &larger);
+    auto_apply(run->table.rows[0].key, run->runs->parts.catalogue, &larger);
     run->probe_pixels = larger.width * larger.height;
     for (int k = 0; k < PROBES; k++)
         add_step(run, &larger, MEASURE_PICTURE);
@@ -138,25 +138,23 @@ static void plan_steps(struct run *run, const struct pen_request *asked)
     const struct pen_catalogue *catalogue = run->runs->parts.catalogue;
     bool software = run->device.software, textured = false;
     struct pen_request small = *asked, timed = *asked;
-    const char *name = pen_catalogue_find(catalogue, "raytraced") ? "raytraced" : "multisample";
-    const struct auto_candidate reference = {name, {{"samples", REFERENCE_SAMPLES}}};
+    char keys[AUTO_MAX_ROWS][AUTO_KEY_BYTES];
     limit_pixels(&small, software ? SOFTWARE_PIXELS : GPU_PIXELS);
     limit_pixels(&timed, software ? SOFTWARE_PIXELS : TIMED_PIXELS);
     run->table.pixels = timed.width * timed.height;
     small.output.format = PEN_PNG;
     small.output.layer = PEN_LAYER_BEAUTY;
     small.output.bit_depth = 0;
-    auto_apply(&reference, catalogue, &small);
+    if (!auto_apply("raytraced " REFERENCE_SETTINGS, catalogue, &small))
+        auto_apply("multisample " REFERENCE_SETTINGS, catalogue, &small);
     add_step(run, &small, MEASURE_REFERENCE);
     for (uint32_t i = 0; i < asked->light_count; i++)
         textured |= asked->lights[i].texture != PEN_TEXTURE_NONE;
-    for (uint32_t i = 0; i < auto_candidate_count && run->table.count < AUTO_MAX_ROWS; i++) {
-        const struct auto_candidate *candidate = &auto_candidates[i];
-        if (!auto_is_candidate(candidate, catalogue, textured, software))
-            continue;
-        auto_key(candidate, run->table.rows[run->table.count++].key);
-        auto_apply(candidate, catalogue, &small);
-        auto_apply(candidate, catalogue, &timed);
+    run->table.count = auto_candidates(catalogue, textured, software, keys);
+    for (uint32_t i = 0; i < run->table.count; i++) {
+        memcpy(run->table.rows[i].key, keys[i], AUTO_KEY_BYTES);
+        auto_apply(keys[i], catalogue, &small);
+        auto_apply(keys[i], catalogue, &timed);
         for (int k = 0; k < COLD; k++)
             add_step(run, &small, MEASURE_NUMBERS);
         for (int k = 0; k < REPEATS; k++)

@@ -5,12 +5,20 @@
 
 static const struct pen_param sample_rows[] = {
     {.name = "samples", .type = PEN_PARAM_UINT, .count = 1, .def = 8, .min = 1, .max = 4096}};
-static const struct pen_technique_info hard = {.name = "hard"};
-static const struct pen_technique_info pcss = {.name = "pcss"};
-static const struct pen_technique_info multisample = {
-    .name = "multisample", .textured = true, .struct_size = 4, .params = {sample_rows, 1}};
-static const struct pen_technique_info raytraced = {
-    .name = "raytraced", .textured = true, .struct_size = 4, .params = {sample_rows, 1}};
+static const struct pen_technique_info hard = {.name = "hard", .candidates = PEN_CANDIDATES("")};
+static const struct pen_technique_info pcss = {.name = "pcss", .candidates = PEN_CANDIDATES("")};
+static const struct pen_technique_info plain = {.name = "plain", .textured = true};
+static const struct pen_technique_info multisample = {.name = "multisample",
+    .textured = true,
+    .struct_size = 4,
+    .params = {sample_rows, 1},
+    .candidates = PEN_CANDIDATES("samples=64", "samples=256"),
+    .candidates_need_gpu = true};
+static const struct pen_technique_info raytraced = {.name = "raytraced",
+    .textured = true,
+    .struct_size = 4,
+    .params = {sample_rows, 1},
+    .candidates = PEN_CANDIDATES("samples=16")};
 
 static const struct auto_table table = {.pixels = 10000,
     .count = 4,
@@ -195,37 +203,33 @@ static void check_empty(void)
 
 static void check_candidates(void)
 {
-    static const struct pen_technique_info *const traced_items[] = {
-        &hard, &pcss, &multisample, &raytraced};
-    static const struct pen_catalogue traced = {traced_items, 4}, untraced = {traced_items, 3};
-    const struct pen_catalogue *with_auto = auto_catalogue(&traced);
-    char key[AUTO_KEY_BYTES];
-    uint32_t many_maps = 0, known = 0;
-    CHECK(with_auto->count == 5);
-    CHECK(pen_catalogue_find(with_auto, AUTO_NAME) == with_auto->items[4]);
-    CHECK(auto_candidate_count <= AUTO_MAX_ROWS);
-    for (uint32_t i = 0; i < auto_candidate_count; i++) {
-        const struct auto_candidate *c = &auto_candidates[i];
-        auto_key(c, key);
-        CHECK(auto_find(key) == c); /* keys are distinct */
-        bool maps = !strcmp(c->technique, "multisample"), rays = !strcmp(c->technique, "raytraced");
-        bool is_known =
-            maps || rays || !strcmp(c->technique, "hard") || !strcmp(c->technique, "pcss");
-        many_maps += maps;
-        known += is_known;
-        CHECK(auto_is_candidate(c, &traced, false, false) == is_known);
-        CHECK(auto_is_candidate(c, &traced, true, false) == (maps || rays));
-        CHECK(auto_is_candidate(c, &traced, true, true) == rays);
-        CHECK(auto_is_candidate(c, &untraced, true, true) == maps);
-    }
-    CHECK(many_maps > 0 && known > many_maps);
-    CHECK(auto_find("pcss filter_taps=1000000") == NULL);
+    static const struct pen_technique_info *const items[] = {
+        &hard, &pcss, &plain, &multisample, &raytraced};
+    static const struct pen_catalogue catalogue = {items, 5};
+    const struct pen_catalogue *with_auto = auto_catalogue(&catalogue);
+    char keys[AUTO_MAX_ROWS][AUTO_KEY_BYTES];
+    CHECK(with_auto->count == 6);
+    CHECK(pen_catalogue_find(with_auto, AUTO_NAME) == with_auto->items[5]);
+    CHECK(auto_candidates(with_auto, false, false, keys) == 5);
+    CHECK_STR(keys[0], "hard");
+    CHECK_STR(keys[1], "pcss");
+    CHECK_STR(keys[2], "multisample samples=64");
+    CHECK_STR(keys[3], "multisample samples=256");
+    CHECK_STR(keys[4], "raytraced samples=16");
+    CHECK(auto_candidates(with_auto, true, false, keys) == 3); /* colours */
+    CHECK(auto_candidates(with_auto, true, true, keys) == 1);
+    CHECK_STR(keys[0], "raytraced samples=16");
+
     struct pen_request request = {0};
-    auto_apply(auto_find("multisample samples=64"), &traced, &request);
+    CHECK(auto_apply("multisample samples=64", &catalogue, &request));
     CHECK_STR(request.technique, "multisample");
     CHECK(request.technique_params[0] == 64);
-    auto_apply(auto_find("hard"), &traced, &request);
+    CHECK(auto_apply("hard", &catalogue, &request));
     CHECK(request.technique_params[0] == 0);
+    static const char *const bad[] = {"", "soft", "hard samples=1", "multisample samples",
+        "multisample samples=0", "multisample samples=x"};
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
+        CHECK(!auto_apply(bad[i], &catalogue, &request));
 }
 
 /* The store keeps tables per view, device and build. */

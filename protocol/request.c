@@ -16,30 +16,9 @@ const char *const pen_pattern_names[] = {
 
 #define FAR 1e6 /* m: single precision still resolves 6 cm there */
 
-#define REQUEST(field, ...) PARAM(struct pen_request, field, __VA_ARGS__)
 static const struct pen_param request_rows[] = {
-    REQUEST(width, .def = 800, .min = 1, .max = PEN_MAX_IMAGE_SIDE, .unit = "px",
-        .help = "Image width."),
-    REQUEST(height, .def = 600, .min = 1, .max = PEN_MAX_IMAGE_SIDE, .unit = "px",
-        .help = "Image height."),
-    REQUEST(ground, .def = 1, .help = "Puts a receiver under the scene's bounds."),
-    REQUEST(ground_albedo, .def_v = {0.5, 0.5, 0.5}, .max = 1,
-        .help = "Diffuse albedo of the ground, linear RGB."),
-    REQUEST(ambient, .def_v = {0.02, 0.02, 0.02}, .max = 1e4, .unit = "W m^-2 sr^-1",
-        .help = "Uniform ambient radiance, linear RGB."),
-    REQUEST(background, .def_v = {0.05, 0.05, 0.06}, .max = 1e4, .unit = "W m^-2 sr^-1",
-        .help = "Radiance where no surface is hit, linear RGB."),
-    REQUEST(exposure_ev, .def = 0, .min = -20, .max = 20, .unit = "stops",
-        .help = "Multiplies the image by two to this power."),
-    REQUEST(tone_map, .def = PEN_TONE_NONE, .choices = pen_tone_map_names,
-        .help = "Curve between radiance and the display; none clips at 1."),
-    REQUEST(antialias, .def = 1, .min = 1, .max = PEN_MAX_ANTIALIAS, .unit = "frames",
-        .help = "Jittered frames averaged into the image."),
-    REQUEST(classify, .def = 1,
-        .help =
-            "Skips pixels that a min-max pyramid proves lit or in umbra, where the method can."),
-    REQUEST(time_s, .def = 0, .min = 0, .max = 1e6, .unit = "s",
-        .help = "Time at which animated emission is shown."),
+#define FIELD(type, name, components, ...) PARAM(struct pen_request, name, __VA_ARGS__),
+#include "protocol/request.def"
 };
 
 #define LOOK_AT PEN_CAMERA_BIT(PEN_CAMERA_LOOK_AT)

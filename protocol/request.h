@@ -86,20 +86,13 @@ struct pen_request {
     uint8_t scene[PEN_ID_BYTES];
     char technique[PEN_TECHNIQUE_NAME_BYTES];                 /* zero-padded */
     uint32_t technique_params[PEN_TECHNIQUE_PARAM_BYTES / 4]; /* the method's own struct */
-    uint32_t width, height;                                   /* px */
     struct pen_camera camera;
     uint32_t lights_given; /* 0: the scene's own, else one that suits the bounds */
     uint32_t light_count;
     struct pen_light lights[PEN_MAX_LIGHTS];
-    pen_flag ground; /* a receiver under the bounds */
-    float ground_albedo[3];
-    float ambient[3];    /* W m^-2 sr^-1, uniform */
-    float background[3]; /* W m^-2 sr^-1 where nothing is hit */
-    float exposure_ev;   /* stops */
-    uint32_t tone_map;   /* enum pen_tone_map */
-    uint32_t antialias;  /* jittered frames per image */
-    pen_flag classify;   /* skip pixels whose answer the min-max pyramid already proves */
-    float time_s;        /* selects the frame of animated emission */
+#define FIELD(type, name, components, ...) type name components;
+#include "protocol/request.def"
+#undef FIELD
     struct pen_output output;
     struct pen_delivery delivery; /* must stay last: see PEN_REQUEST_KEY_BYTES */
 };

@@ -6,7 +6,7 @@ import tree
 
 FLOOR_1 = ["protocol/%s.h" % name for name in (
     "error", "fnv", "limits", "memory", "param", "request", "result", "technique_info")] + [
-        "protocol/codes.def"]
+        "protocol/codes.def", "protocol/request.def"]
 PURE = set("""assert ctype errno fenv float inttypes limits locale math stdalign stdarg stdatomic
     stdbool stddef stdint stdio stdlib string strings time""".split())
 SYSTEM = PURE | set("""byteswap dirent dlfcn endian fcntl fnmatch getopt glob immintrin libgen link

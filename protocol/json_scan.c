@@ -1,4 +1,5 @@
 #include "protocol/json_scan.h"
+#include "protocol/hex.h"
 #include <assert.h>
 #include <string.h>
 
@@ -33,23 +34,12 @@ static bool is_digit(int c)
     return c >= '0' && c <= '9';
 }
 
-static int hex_digit(int c)
-{
-    if (is_digit(c))
-        return c - '0';
-    if (c >= 'a' && c <= 'f')
-        return c - 'a' + 10;
-    if (c >= 'A' && c <= 'F')
-        return c - 'A' + 10;
-    return -1;
-}
-
 /* The four digits after "\u"; -1 when they are not four digits. */
 static int scan_hex4(struct scan *scan)
 {
     int value = 0;
     for (int i = 0; i < 4; i++, scan->at++) {
-        int digit = hex_digit(peek(scan));
+        int digit = pen_hex_digit(peek(scan));
         if (digit < 0)
             return -1;
         value = value * 16 + digit;

@@ -1,4 +1,5 @@
 #include "clients/cli/gltf_files.h"
+#include "protocol/hex.h"
 #include "protocol/memory.h"
 #include "protocol/request.h"
 #include "renderer/import/bundle.h"
@@ -21,19 +22,13 @@ static bool has(const struct cli_files *files, const char *name)
     return false;
 }
 
-static int hex_digit(char c)
-{
-    const char *at = c ? strchr("0123456789abcdef", c | 0x20) : NULL;
-    return at ? (int)(at - "0123456789abcdef") : -1;
-}
-
 /* Percent-decodes a URI reference; NULL when it holds a NUL. */
 static char *decode(const char *uri)
 {
     char *name = cli_format("%s", uri), *out = name;
     for (const char *in = uri; *in; in++) {
-        int high = *in == '%' ? hex_digit(in[1]) : -1;
-        int low = high >= 0 ? hex_digit(in[2]) : -1;
+        int high = *in == '%' ? pen_hex_digit(in[1]) : -1;
+        int low = high >= 0 ? pen_hex_digit(in[2]) : -1;
         *out++ = low >= 0 ? (char)(high * 16 + low) : *in;
         in += low >= 0 ? 2 : 0;
     }

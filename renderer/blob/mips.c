@@ -1,3 +1,4 @@
+#include "protocol/srgb.h"
 #include "renderer/blob/geometry.h"
 #include <math.h>
 #include <pthread.h>
@@ -12,12 +13,11 @@ static void make_tables(void)
 {
     for (int i = 0; i < 256; i++) {
         double s = i / 255.0;
-        linear_of[i] = (float)(s <= 0.04045 ? s / 12.92 : pow((s + 0.055) / 1.055, 2.4));
+        linear_of[i] = (float)pen_srgb_decode(s);
     }
     for (int i = 0; i < STEPS; i++) {
         double l = i / (STEPS - 1.0);
-        double s = l <= 0.0031308 ? 12.92 * l : 1.055 * pow(l, 1 / 2.4) - 0.055;
-        srgb_of[i] = (uint8_t)(s * 255 + 0.5);
+        srgb_of[i] = (uint8_t)(pen_srgb_encode(l) * 255 + 0.5);
     }
 }
 

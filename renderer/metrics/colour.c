@@ -1,5 +1,6 @@
 /* Conversions after IEC 61966-2-1 and CIE 15. */
 #include "renderer/metrics/colour.h"
+#include "protocol/srgb.h"
 #include <math.h>
 
 static void multiply(const double m[3][3], const double v[3], double out[3])
@@ -51,8 +52,7 @@ struct metrics_colour metrics_colour_srgb(void)
 
 double metrics_decode(double value)
 {
-    value = fmin(fmax(value, 0), 1);
-    return value <= 0.04045 ? value / 12.92 : pow((value + 0.055) / 1.055, 2.4);
+    return pen_srgb_decode(fmin(fmax(value, 0), 1));
 }
 
 void metrics_opponent(const struct metrics_colour *space, const double rgb[3], double ycc[3])

@@ -1,5 +1,6 @@
 #include "renderer/scene/emission.h"
 #include "protocol/memory.h"
+#include "protocol/srgb.h"
 #include "renderer/scene/emission_pattern.h"
 #include <math.h>
 #include <stdlib.h>
@@ -165,11 +166,6 @@ static void resample(
     free(rows);
 }
 
-static float srgb_to_linear(float v)
-{
-    return v <= 0.04045f ? v / 12.92f : powf((v + 0.055f) / 1.055f, 2.4f);
-}
-
 static void make_image(struct emission *emission, const struct psc_scene *blob, uint32_t number)
 {
     const struct psc_image *image = &blob->images[number];
@@ -182,7 +178,7 @@ static void make_image(struct emission *emission, const struct psc_scene *blob, 
     }
     float linear[256];
     for (int i = 0; i < 256; i++)
-        linear[i] = image->srgb ? srgb_to_linear((float)i / 255) : (float)i / 255;
+        linear[i] = image->srgb ? pen_srgb_decodef((float)i / 255) : (float)i / 255;
     float(*source)[4] = pen_alloc_zero((size_t)w * h, sizeof *source);
     for (size_t i = 0; i < (size_t)w * h; i++)
         for (int k = 0; k < 3; k++)

@@ -1,13 +1,6 @@
 #include "server/http/query.h"
+#include "protocol/hex.h"
 #include <string.h>
-
-static int hex_digit(char c)
-{
-    return c >= '0' && c <= '9'   ? c - '0'
-           : c >= 'a' && c <= 'f' ? c - 'a' + 10
-           : c >= 'A' && c <= 'F' ? c - 'A' + 10
-                                  : -1;
-}
 
 static bool decode(char *text)
 {
@@ -17,7 +10,7 @@ static bool decode(char *text)
             *to++ = *from == '+' ? ' ' : *from;
             continue;
         }
-        int high = hex_digit(from[1]), low = high < 0 ? -1 : hex_digit(from[2]);
+        int high = pen_hex_digit(from[1]), low = high < 0 ? -1 : pen_hex_digit(from[2]);
         if (low < 0 || (high == 0 && low == 0))
             return false;
         *to++ = (char)(high * 16 + low);

@@ -1,5 +1,6 @@
 #include "server/workers/worker_measure.h"
 #include "protocol/memory.h"
+#include "protocol/srgb.h"
 #include "renderer/encode/encode.h"
 #include "renderer/metrics/metrics.h"
 #include <math.h>
@@ -28,8 +29,7 @@ void worker_measure_output(struct pen_output *output)
 
 static float encode_srgb(float c)
 {
-    c = c > 0 ? fminf(c, 1) : 0; /* NaN: 0 */
-    return c <= 0.0031308f ? 12.92f * c : 1.055f * powf(c, 1 / 2.4f) - 0.055f;
+    return pen_srgb_encodef(c > 0 ? fminf(c, 1) : 0); /* NaN: 0 */
 }
 
 void worker_measure_display(

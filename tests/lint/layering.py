@@ -4,9 +4,10 @@ import re
 
 import tree
 
-FLOOR_1 = ["protocol/%s.h" % name for name in (
-    "error", "fnv", "limits", "memory", "param", "request", "result", "technique_info")] + [
-        "protocol/codes.def", "protocol/request.def"]
+BASICS = ("error", "fnv", "hex", "limits", "memory", "param", "request", "result", "srgb",
+          "technique_info")
+FLOOR_1 = ["protocol/%s.h" % name for name in BASICS] + ["protocol/codes.def",
+                                                         "protocol/request.def"]
 PURE = set("""assert ctype errno fenv float inttypes limits locale math stdalign stdarg stdatomic
     stdbool stddef stdint stdio stdlib string strings time""".split())
 SYSTEM = PURE | set("""byteswap dirent dlfcn endian fcntl fnmatch getopt glob immintrin libgen link
@@ -18,7 +19,7 @@ CXX_SHIMS = ["renderer/import/*.cpp", "renderer/encode/*.cpp"]
 
 # pattern of the including file, project headers it may include, headers of libraries, system headers
 RULES = [
-    (r"protocol/(error|fnv|limits|memory|param|request|result|technique_info)\.[ch]", FLOOR_1, [], "pure"),
+    (r"protocol/(%s)\.[ch]" % "|".join(BASICS), FLOOR_1, [], "pure"),
     (r"protocol/.*", ["protocol/*"], ["cjson/cJSON.h"], "pure"),
     (r"renderer/blob/.*", FLOOR_1 + ["renderer/blob/*"], [], "system"),
     (r"renderer/generate/.*", FLOOR_1 + ["renderer/blob/*", "renderer/generate/*"],

@@ -1,4 +1,5 @@
 #include "renderer/import/files/files.h"
+#include "protocol/hex.h"
 #include "protocol/memory.h"
 #include "renderer/import/base/budget.h"
 #include "renderer/import/bundle.h"
@@ -237,14 +238,6 @@ bool imp_files_load(struct imp_files *files, const struct imp_file *file, struct
     return true;
 }
 
-static int hex_digit(char c)
-{
-    if (c >= '0' && c <= '9')
-        return c - '0';
-    c |= 0x20;
-    return c >= 'a' && c <= 'f' ? c - 'a' + 10 : -1;
-}
-
 /* Joins base's folder and the decoded uri, and folds "." and "..", into `name`. False when the
  * result is no safe name. */
 static bool join(const char *base, const char *uri, char name[PEN_BUNDLE_MAX_NAME + 1])
@@ -257,8 +250,8 @@ static bool join(const char *base, const char *uri, char name[PEN_BUNDLE_MAX_NAM
     for (const char *c = uri; *c; c++) {
         if (n >= sizeof joined - 1)
             return false;
-        int high = c[0] == '%' ? hex_digit(c[1]) : -1;
-        int low = high >= 0 ? hex_digit(c[2]) : -1;
+        int high = c[0] == '%' ? pen_hex_digit(c[1]) : -1;
+        int low = high >= 0 ? pen_hex_digit(c[2]) : -1;
         joined[n++] = low >= 0 ? (char)(high << 4 | low) : *c;
         c += low >= 0 ? 2 : 0;
         if (!joined[n - 1])

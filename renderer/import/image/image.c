@@ -1,5 +1,6 @@
 #include "renderer/import/image/image.h"
 #include "protocol/memory.h"
+#include "protocol/srgb.h"
 #include "renderer/import/base/budget.h"
 #include <math.h>
 #include <stdlib.h>
@@ -87,14 +88,12 @@ bool imp_image_decode(struct imp_bytes data, uint32_t width, uint32_t height, ui
 
 static float to_linear(uint8_t x)
 {
-    float s = (float)x / 255;
-    return s <= 0.04045f ? s / 12.92f : powf((s + 0.055f) / 1.055f, 2.4f);
+    return pen_srgb_decodef((float)x / 255);
 }
 
 static uint8_t to_srgb(float x)
 {
-    float s = x <= 0.0031308f ? x * 12.92f : 1.055f * powf(x, 1 / 2.4f) - 0.055f;
-    return (uint8_t)lrintf(s * 255);
+    return (uint8_t)lrintf(pen_srgb_encodef(x) * 255);
 }
 
 void imp_image_halve(uint8_t *rgba, uint32_t *width, uint32_t *height, bool srgb)

@@ -1,5 +1,7 @@
 // Reeves et al. 1987: V = mean of [plane depth <= map depth] over a square of the map. The pattern
 // is the same for every pixel, so there is no noise; a bilinear weight per tap hides its steps.
+#include "sequences.glsl"
+
 float compare_bilinear(ReceiverPlane plane, vec2 offset, vec2 l, vec2 texel, float bias)
 {
     vec2 at = (l + offset - light.rect.xy) / texel - 0.5;
@@ -21,7 +23,7 @@ vec4 visibility(Surface s)
     vec2 at = vec2(0.5);
     for (int i = 0; i < P(taps); i++) {
         sum += compare_bilinear(plane, (2.0 * at - 1.0) * P(radius) * texel, q, texel, bias);
-        at = fract(at + vec2(0.75487767, 0.56984029));
+        at = fract(at + R2_STEP);
     }
     return scalar_visibility(sum / float(P(taps)));
 }

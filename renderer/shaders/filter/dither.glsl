@@ -1,5 +1,7 @@
 // One of 16 phases per pixel, each once in every 4 x 4 block and neighbours far apart (Bayer's order).
 // Irrational steps move all of them from one jittered frame to the next.
+#include "sequences.glsl"
+
 int dither_order(ivec2 pixel)
 {
     int x = pixel.x ^ pixel.y, y = pixel.y;
@@ -11,9 +13,8 @@ float dither(ivec2 pixel, float frame)
     return fract((float(dither_order(pixel)) + 0.5) / 16.0 + 0.61803399 * frame);
 }
 
-// The 16 points of a Hammersley set in [0, 1)^2.
+// The 16 points of a Hammersley set.
 vec2 dither2(ivec2 pixel, float frame)
 {
-    int order = dither_order(pixel), reversed = bitfieldReverse(order) >> 28 & 15;
-    return fract((vec2(order, reversed) + 0.5) / 16.0 + frame * vec2(0.75487767, 0.56984029));
+    return fract(hammersley16(dither_order(pixel)) + frame * R2_STEP);
 }

@@ -1,7 +1,9 @@
 // Sampling patterns of kernels over the emitter's shape, points in [-1, 1]^2. A pattern is walked by
 // adding a constant, so that a tap costs no trigonometry.
 //
-// Rectangle: the R2 sequence (Roberts 2018). Disk: Vogel's spiral (1979), equal area per tap.
+// Rectangle: the R2 sequence. Disk: Vogel's spiral (1979), equal area per tap.
+#include "sequences.glsl"
+
 struct Taps {
     vec2 at;        // R2 state in [0, 1)^2, or unit direction of the spiral
     float index, inverse_count;
@@ -30,7 +32,7 @@ vec2 taps_next(inout Taps t)
         t.at = mat2(-0.73736888, 0.67549029, -0.67549029, -0.73736888) * t.at; // golden angle
     } else {
         p = 2.0 * t.at - 1.0;
-        t.at = fract(t.at + vec2(0.75487767, 0.56984029));
+        t.at = fract(t.at + R2_STEP);
     }
     t.index += 1.0;
     return p;
@@ -42,9 +44,8 @@ vec2 taps_next(inout Taps t)
 vec2 interleaved_shift(ivec2 pixel)
 {
     // Bits of x and y interleaved, so that neighbours are far apart in the set.
-    uint order = uint((pixel.x & 1) << 3 | (pixel.y & 1) << 2 | (pixel.x & 2) | (pixel.y & 2) >> 1);
-    uint reversed = bitfieldReverse(order) >> 28;
-    return (vec2(order, reversed) + 0.5) / 16.0;
+    return hammersley16(
+        (pixel.x & 1) << 3 | (pixel.y & 1) << 2 | (pixel.x & 2) | (pixel.y & 2) >> 1);
 }
 
 // Frame number folded in, so that jittered frames average different patterns.

@@ -19,10 +19,7 @@ static const struct pen_param rows[] = {
     MAP_SIZE_ROW(struct bilateral, 1024),
     BIAS_ROW(struct bilateral),
     PENUMBRA_ROWS(struct bilateral, 12),
-    PARAM(struct bilateral, filter_taps, .def = 4, .min = 1, .max = 64,
-        .help = "Most taps to each side of a pixel, in each of the two passes."),
-    PARAM(struct bilateral, sigma, .def = 0.15, .min = 0, .max = 4,
-        .help = "Width of the filter over that of the penumbra."),
+    GAUSS_ROWS(struct bilateral, 4, 0.15),
     FILTER_ROWS(struct bilateral),
 };
 

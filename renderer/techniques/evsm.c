@@ -1,5 +1,4 @@
-#include "renderer/passes/map/moments.h"
-#include "renderer/techniques/map_params.h"
+#include "renderer/techniques/moment_params.h"
 
 struct evsm {
     uint32_t map_size;
@@ -14,8 +13,7 @@ struct evsm {
 static const struct pen_param rows[] = {
     MAP_SIZE_ROW(struct evsm, 1024),
     BIAS_ROW(struct evsm),
-    PARAM(struct evsm, blur, .def = 2, .min = 0, .max = 15, .unit = "texel",
-        .help = "Radius of the Gaussian that the map is blurred with."),
+    BLUR_ROW(struct evsm),
     PARAM(struct evsm, positive_exponent, .def = 40, .min = 0.1, .max = 42,
         .help = "Strength of the warp that separates blockers from what lies behind them."),
     PARAM(struct evsm, negative_exponent, .def = 5, .min = 0.1, .max = 42,
@@ -33,18 +31,7 @@ static bool record(struct technique_run *run, struct pen_error *error)
         .kind = MOMENTS_EXPONENTIAL, .size = params->map_size, .blur = params->blur};
     desc.exponents[0] = params->positive_exponent;
     desc.exponents[1] = params->negative_exponent;
-    const struct shadow_input *map = pass_moments(run, &desc, error);
-    const struct gl_texture *tiles;
-    if (!map || !pass_moment_tiles(run, &desc, &tiles, error))
-        return false;
-    struct pass_texture texture = {UNIT_FREE, map->textures[0].name, GL_SAMPLE_TRILINEAR};
-    return pass_screen(run,
-        &(struct pass_screen){.name = "evsm",
-            .body = "evsm.glsl",
-            .textures = &texture,
-            .texture_count = 1,
-            .tiles = tiles},
-        error);
+    return moment_screen(run, &desc, "evsm", "evsm.glsl", error);
 }
 
 const struct technique technique_evsm = {

@@ -1,5 +1,4 @@
-#include "renderer/passes/map/moments.h"
-#include "renderer/techniques/map_params.h"
+#include "renderer/techniques/moment_params.h"
 
 struct msm {
     uint32_t map_size;
@@ -15,8 +14,7 @@ static const char *const precision_names[] = {"float32", "unorm16", NULL};
 static const struct pen_param rows[] = {
     MAP_SIZE_ROW(struct msm, 1024),
     BIAS_ROW(struct msm),
-    PARAM(struct msm, blur, .def = 2, .min = 0, .max = 15, .unit = "texel",
-        .help = "Radius of the Gaussian that the map is blurred with."),
+    BLUR_ROW(struct msm),
     PARAM(struct msm, precision, .choices = precision_names, .specialise = 1,
         .help = "Numbers of the moment map: 16 or 8 bytes a texel."),
     PARAM(struct msm, moment_bias, .def = 0, .min = 0, .max = 0.01,
@@ -31,18 +29,7 @@ static bool record(struct technique_run *run, struct pen_error *error)
     struct moment_map desc = {.kind = params->precision ? MOMENTS_FOUR_UNORM : MOMENTS_FOUR,
         .size = params->map_size,
         .blur = params->blur};
-    const struct shadow_input *map = pass_moments(run, &desc, error);
-    const struct gl_texture *tiles;
-    if (!map || !pass_moment_tiles(run, &desc, &tiles, error))
-        return false;
-    struct pass_texture texture = {UNIT_FREE, map->textures[0].name, GL_SAMPLE_TRILINEAR};
-    return pass_screen(run,
-        &(struct pass_screen){.name = "msm",
-            .body = "msm.glsl",
-            .textures = &texture,
-            .texture_count = 1,
-            .tiles = tiles},
-        error);
+    return moment_screen(run, &desc, "msm", "msm.glsl", error);
 }
 
 const struct technique technique_msm = {

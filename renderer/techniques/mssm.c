@@ -1,6 +1,4 @@
-#include "renderer/passes/map/classify.h"
-#include "renderer/passes/map/sat.h"
-#include "renderer/techniques/map_params.h"
+#include "renderer/techniques/sat_params.h"
 
 struct mssm {
     uint32_t map_size;
@@ -25,10 +23,7 @@ static const struct pen_param rows[] = {
         .help = "Share of a spread-out distribution mixed in against rounding."),
     PARAM(struct mssm, bleed, .def = 0, .min = 0, .max = 0.9,
         .help = "Visibility that counts as none; cuts light bleeding and narrows penumbrae."),
-    PARAM(struct mssm, min_filter, .def = 1, .min = 0.5, .max = 16, .unit = "texel",
-        .help = "Least half width of a window."),
-    PARAM(struct mssm, max_window, .def = 128, .min = 40, .max = 256, .unit = "texel",
-        .help = "Width of the widest window: the table is halved until the light's search fits."),
+    SAT_ROWS(struct mssm, 256),
 };
 
 static bool record(struct technique_run *run, struct pen_error *error)
@@ -36,22 +31,17 @@ static bool record(struct technique_run *run, struct pen_error *error)
     const struct mssm *params = run->params;
     struct sat_table table = {
         .kind = SAT_FOUR_MOMENTS, .map_size = params->map_size, .max_window = params->max_window};
-    struct sat_block block;
-    const struct shadow_input *min_max = pass_min_max(run, params->map_size, error);
-    const struct shadow_input *sat = min_max ? pass_sat(run, &table, &block, error) : NULL;
-    const struct gl_texture *tiles;
-    if (!sat || !pass_lit_tiles(run, params->map_size, params->min_filter + 1, 0, &tiles, error))
+    struct sat_lookup lookup;
+    if (!sat_prepare(run, &table, params->min_filter, &lookup, error))
         return false;
-    struct pass_texture textures[] = {{UNIT_FREE + 1, sat->textures[0].name, GL_SAMPLE_NEAREST},
-        {UNIT_MIN_MAX, min_max->textures[0].name, GL_SAMPLE_NEAREST}};
     return pass_screen(run,
         &(struct pass_screen){.name = "mssm",
             .body = "mssm.glsl",
-            .textures = textures,
+            .textures = lookup.textures,
             .texture_count = 2,
-            .tiles = tiles,
-            .extra = &block,
-            .extra_bytes = sizeof block},
+            .tiles = lookup.tiles,
+            .extra = &lookup.block,
+            .extra_bytes = sizeof lookup.block},
         error);
 }
 

@@ -16,10 +16,7 @@ static const struct pen_param rows[] = {
     MAP_SIZE_ROW(struct screen_space, 2048),
     BIAS_ROW(struct screen_space),
     PENUMBRA_ROWS(struct screen_space, 16),
-    PARAM(struct screen_space, filter_taps, .def = 12, .min = 1, .max = 64,
-        .help = "Most taps to each side of a pixel, in each of the two passes."),
-    PARAM(struct screen_space, sigma, .def = 1, .min = 0, .max = 4,
-        .help = "Width of the filter over that of the penumbra."),
+    GAUSS_ROWS(struct screen_space, 12, 1),
     FILTER_ROWS(struct screen_space),
 };
 

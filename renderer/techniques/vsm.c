@@ -1,5 +1,4 @@
-#include "renderer/passes/map/moments.h"
-#include "renderer/techniques/map_params.h"
+#include "renderer/techniques/moment_params.h"
 
 struct vsm {
     uint32_t map_size;
@@ -12,8 +11,7 @@ struct vsm {
 static const struct pen_param rows[] = {
     MAP_SIZE_ROW(struct vsm, 1024),
     BIAS_ROW(struct vsm),
-    PARAM(struct vsm, blur, .def = 2, .min = 0, .max = 15, .unit = "texel",
-        .help = "Radius of the Gaussian that the map is blurred with."),
+    BLUR_ROW(struct vsm),
     PARAM(struct vsm, min_variance, .def = 1e-5, .min = 0, .max = 0.01,
         .help = "Least variance of depth, in squares of the map's depth range."),
     PARAM(struct vsm, bleed, .def = 0.2, .min = 0, .max = 0.9,
@@ -25,18 +23,7 @@ static bool record(struct technique_run *run, struct pen_error *error)
     const struct vsm *params = run->params;
     struct moment_map desc = {
         .kind = MOMENTS_VARIANCE, .size = params->map_size, .blur = params->blur};
-    const struct shadow_input *map = pass_moments(run, &desc, error);
-    const struct gl_texture *tiles;
-    if (!map || !pass_moment_tiles(run, &desc, &tiles, error))
-        return false;
-    struct pass_texture texture = {UNIT_FREE, map->textures[0].name, GL_SAMPLE_TRILINEAR};
-    return pass_screen(run,
-        &(struct pass_screen){.name = "vsm",
-            .body = "vsm.glsl",
-            .textures = &texture,
-            .texture_count = 1,
-            .tiles = tiles},
-        error);
+    return moment_screen(run, &desc, "vsm", "vsm.glsl", error);
 }
 
 const struct technique technique_vsm = {

@@ -1,7 +1,5 @@
-#include "renderer/passes/map/classify.h"
 #include "renderer/passes/filter/interleave.h"
-#include "renderer/passes/map/sat.h"
-#include "renderer/techniques/map_params.h"
+#include "renderer/techniques/sat_params.h"
 
 static const char *const subdivide_names[] = {"quadtree", "uniform", "off", NULL};
 
@@ -38,10 +36,7 @@ static const struct pen_param rows[] = {
         .help = "Least variance of depth, in squares of the map's depth range."),
     PARAM(struct vssm, bleed, .def = 0, .min = 0, .max = 0.9,
         .help = "Visibility that counts as none; cuts light bleeding and narrows penumbrae."),
-    PARAM(struct vssm, min_filter, .def = 1, .min = 0.5, .max = 16, .unit = "texel",
-        .help = "Least half width of a window."),
-    PARAM(struct vssm, max_window, .def = 128, .min = 40, .max = 512, .unit = "texel",
-        .help = "Width of the widest window: the table is halved until the light's search fits."),
+    SAT_ROWS(struct vssm, 512),
 };
 
 static bool record(struct technique_run *run, struct pen_error *error)
@@ -49,23 +44,18 @@ static bool record(struct technique_run *run, struct pen_error *error)
     const struct vssm *params = run->params;
     struct sat_table table = {
         .kind = SAT_VARIANCE, .map_size = params->map_size, .max_window = params->max_window};
-    struct sat_block block;
+    struct sat_lookup lookup;
     const struct shadow_input *map = pass_depth_map(run, params->map_size, error);
-    const struct shadow_input *min_max = map ? pass_min_max(run, params->map_size, error) : NULL;
-    const struct shadow_input *sat = min_max ? pass_sat(run, &table, &block, error) : NULL;
-    const struct gl_texture *tiles;
-    if (!sat || !pass_lit_tiles(run, params->map_size, params->min_filter + 1, 0, &tiles, error))
+    if (!map || !sat_prepare(run, &table, params->min_filter, &lookup, error))
         return false;
-    struct pass_texture textures[] = {{UNIT_FREE + 1, sat->textures[0].name, GL_SAMPLE_NEAREST},
-        {UNIT_MIN_MAX, min_max->textures[0].name, GL_SAMPLE_NEAREST}};
     struct pass_screen pass = {.name = "vssm",
         .body = "vssm.glsl",
         .shadow = &map->textures[0],
-        .textures = textures,
+        .textures = lookup.textures,
         .texture_count = 2,
-        .tiles = tiles,
-        .extra = &block,
-        .extra_bytes = sizeof block};
+        .tiles = lookup.tiles,
+        .extra = &lookup.block,
+        .extra_bytes = sizeof lookup.block};
     return params->smooth.on ? pass_interleaved(run, &pass, error) : pass_screen(run, &pass, error);
 }
 

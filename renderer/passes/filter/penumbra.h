@@ -10,7 +10,13 @@
         .help = "Samples used to find the average blocker depth."),                                \
         PARAM(aggregate, min_filter, .def = 1, .min = 0, .max = 16, .unit = "texel",               \
             .help = "Least half width of the penumbra.")
-/* And those of the filters. */
+/* Those of the separable Gaussian. */
+#define GAUSS_ROWS(aggregate, default_taps, default_sigma)                                         \
+    PARAM(aggregate, filter_taps, .def = default_taps, .min = 1, .max = 64,                        \
+        .help = "Most taps to each side of a pixel, in each of the two passes."),                  \
+        PARAM(aggregate, sigma, .def = default_sigma, .min = 0, .max = 4,                          \
+            .help = "Width of the filter over that of the penumbra.")
+/* And those of every filter. */
 #define FILTER_ROWS(aggregate)                                                                     \
     PARAM(aggregate, max_radius, .def = 128, .min = 1, .max = 1024, .unit = "px",                  \
         .help = "Largest reach of the filter on the screen."),                                     \

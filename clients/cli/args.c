@@ -107,6 +107,27 @@ bool cli_common_option(struct cli_args *args, struct cli_server *server)
     return true;
 }
 
+bool cli_words(struct cli_args *args, const struct cli_words *words)
+{
+    const char *word;
+    int count = 0;
+    cli_server_init(words->server);
+    while (args->at < args->count && args->status == CLI_OK) {
+        if (cli_common_option(args, words->server))
+            continue;
+        if (cli_flag(args, "json"))
+            *words->json = true;
+        else if (cli_flag(args, "help") || cli_flag(args, "h")) {
+            args->status = fputs(words->help, stdout) < 0 ? CLI_FAILED : CLI_OK;
+            return false;
+        } else if (count < words->room && (word = cli_positional(args)))
+            words->words[count++] = word;
+        else
+            args->status = cli_unknown(args, words->command);
+    }
+    return args->status == CLI_OK;
+}
+
 /* A finite number in the notation of JSON, or close to it, and nothing else. */
 static bool is_number(const char *text, double *number)
 {

@@ -43,6 +43,18 @@ void cli_server_init(struct cli_server *server);
 /* Consumes --server, --retry and -v. */
 bool cli_common_option(struct cli_args *args, struct cli_server *server);
 
+/* What a command takes that has words, --json and the common options. */
+struct cli_words {
+    const char *command, *help;
+    const char **words; /* kept where none is given */
+    int room;
+    struct cli_server *server;
+    bool *json;
+};
+/* False: there is nothing to do but to return args->status (help was printed, or something is
+ * wrong). */
+bool cli_words(struct cli_args *args, const struct cli_words *words);
+
 int cli_render(struct cli_args *args);
 int cli_compare(struct cli_args *args);
 int cli_scenes(struct cli_args *args);

@@ -107,23 +107,9 @@ static int upload(const struct cli_server *server, const char *path)
 int cli_scenes(struct cli_args *args)
 {
     struct cli_server server;
-    const char *words[2] = {"list", NULL}, *word;
+    const char *words[2] = {"list", NULL};
     bool json = false;
-    int count = 0;
-    cli_server_init(&server);
-    while (args->at < args->count && args->status == CLI_OK) {
-        if (cli_common_option(args, &server))
-            continue;
-        if (cli_flag(args, "json"))
-            json = true;
-        else if (cli_flag(args, "help") || cli_flag(args, "h"))
-            return fputs(help_text, stdout) < 0 ? CLI_FAILED : CLI_OK;
-        else if (count < 2 && (word = cli_positional(args)))
-            words[count++] = word;
-        else
-            return cli_unknown(args, "scenes");
-    }
-    if (args->status != CLI_OK)
+    if (!cli_words(args, &(struct cli_words){"scenes", help_text, words, 2, &server, &json}))
         return args->status;
     if (!strcmp(words[0], "list") && !words[1])
         return list(&server, json);

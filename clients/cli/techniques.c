@@ -61,22 +61,9 @@ static void print_list(const cJSON *root)
 int cli_techniques(struct cli_args *args)
 {
     struct cli_server server;
-    const char *name = NULL, *word;
+    const char *name = NULL;
     bool json = false;
-    cli_server_init(&server);
-    while (args->at < args->count && args->status == CLI_OK) {
-        if (cli_common_option(args, &server))
-            continue;
-        if (cli_flag(args, "json"))
-            json = true;
-        else if (cli_flag(args, "help") || cli_flag(args, "h"))
-            return fputs(help_text, stdout) < 0 ? CLI_FAILED : CLI_OK;
-        else if (!name && (word = cli_positional(args)))
-            name = word;
-        else
-            return cli_unknown(args, "techniques");
-    }
-    if (args->status != CLI_OK)
+    if (!cli_words(args, &(struct cli_words){"techniques", help_text, &name, 1, &server, &json}))
         return args->status;
     if (name && name[strspn(name, "abcdefghijklmnopqrstuvwxyz0123456789-")])
         return cli_fail(CLI_USAGE, "A method's name has lower-case letters, digits and '-'.");

@@ -86,3 +86,30 @@ double textured_difference(const struct shot *a, const struct shot *b, double *w
         *worst = most;
     return sqrt(sum / (3.0 * n));
 }
+
+/* The image of number 2. */
+#define TOP_RED "e102000000000000000000000000000000000000000000000000000000000000"
+
+void textured_check_t5(
+    const uint8_t id[PEN_ID_BYTES], const char *method, const struct planar_case *t, double most)
+{
+    static const uint8_t red_green[2 * 4] = {255, 0, 0, 255, 0, 255, 0, 255};
+    uint8_t image[PEN_ID_BYTES];
+    textured_image(2, 1, 2, 1, red_green, image); /* top red */
+    for (int i = 0; i < 4; i++) {
+        int axis = i >> 1, sign = i & 1 ? 1 : -1;
+        char text[640];
+        struct shot shot;
+        double worst;
+        snprintf(text, sizeof text, "%s" HARNESS_VIEW "%s&light.texture.%s", method,
+            textured_light(axis, sign), axis ? "image=" TOP_RED : "pattern=two-colour");
+        harness_shot(id, text, &shot);
+        double rmse = textured_t5(&shot, t, axis ? sign > 0 : sign < 0, &worst);
+        fprintf(stderr, "T5 axis %d%+d: rmse %.5f worst %.4f\n", axis, sign, rmse, worst);
+        CHECK(rmse < most);
+        for (uint32_t k = 0; k < shot.width * shot.height; k++)
+            CHECK_NEAR(shot.visibility[4 * k] + shot.visibility[4 * k + 1],
+                shot.visibility[4 * k + 3], 0.06);
+        harness_shot_finish(&shot);
+    }
+}

@@ -17,5 +17,10 @@ const char *textured_light(int axis, int sign);
 double textured_t5(
     const struct shot *shot, const struct planar_case *t, bool red_is_right, double *worst);
 
+/* T5 by `method` (settings, ended by '&') over the half-plane scene `id` of that case, along both
+ * axes of the light and both ways: at most `most`, and red and green each half of the light. */
+void textured_check_t5(
+    const uint8_t id[PEN_ID_BYTES], const char *method, const struct planar_case *t, double most);
+
 /* Root mean square difference of the coloured visibility of two shots, over all pixels. */
 double textured_difference(const struct shot *a, const struct shot *b, double *worst);

@@ -54,6 +54,7 @@ static bool record(struct technique_run *run, struct pen_error *error)
     return pass_screen(run,
         &(struct pass_screen){.name = "accumulation",
             .body = "accumulation.glsl",
+            .defines = params->layers > 1 ? "#define LAYERED\n" : NULL,
             .textures = textures,
             .texture_count = params->layers > 1 ? 3 : 2,
             .tiles = tiles},

@@ -1,11 +1,11 @@
 // Aszodi and Szirmay-Kalos 2006: every map texel is a small caster whose shadow on the emitter is
-// added up. MODE 0 takes K x K points as printed (with c_z < r_z added and the sum divided by the
-// light's area), 1 clips the texels' rectangles against the emitter. With more than one layer the
-// sum becomes the paper's occlusion bits.
-#define P_fill 0
+// added up. Mode paper takes K x K points as printed (with c_z < r_z added and the sum divided by the
+// light's area), clipped clips the texels' rectangles against the emitter. LAYERED, with more than one
+// layer, the sum becomes the paper's occlusion bits.
+#define PATCHES_APART
 #include "caster_patches.glsl"
 #include "emitter_area.glsl"
-#if P_layers > 1
+#ifdef LAYERED
 #define LIGHT_BITS 256
 #include "light_bits.glsl"
 #endif
@@ -14,21 +14,22 @@ float hidden_share;
 
 void add_patch(vec2 low, vec2 high, float share)
 {
-#if P_layers > 1
+#ifdef LAYERED
     vec2 cut = 0.5 * (high - low) * (1.0 - sqrt(share));
     bits_add(low + cut, high - cut);
-#elif P_mode == 0
+#else
+    if (P(mode) == MODE_CLIPPED) {
+        hidden_share += share * emitter_share(low, high);
+        return;
+    }
     // The whole caster counts when its centre lies before the light.
     vec2 at = 0.5 * (low + high), size = high - low;
     bool before = light_shape == SHAPE_DISK ? dot(at, at) < 1.0 : max(abs(at.x), abs(at.y)) < 1.0;
     if (before)
         hidden_share += size.x * size.y * (light_shape == SHAPE_DISK ? 1.0 / 3.14159265 : 0.25);
-#else
-    hidden_share += share * emitter_share(low, high);
 #endif
 }
 
-#if P_mode == 0
 void walk_points(PatchWindow w, float receiver_z)
 {
     // The light as the receiver sees it on the map plane (F4), or the part of it that casters of
@@ -41,7 +42,7 @@ void walk_points(PatchWindow w, float receiver_z)
     vec2 to_e = to_texels * w.texel; // per metre
     vec2 pitch = 2.0 * reach / float(P(kernel));
     int k = w.answer == LIT ? 0 : int(P(kernel));
-    for (int layer = 0; layer < P(layers); layer++)
+    for (int layer = 0; layer < int(P(layers)); layer++)
         for (int y = 0; y < k; y++)
             for (int x = 0; x < k; x++) {
                 vec2 low = vec2(x, y) * pitch - reach, middle = low + 0.5 * pitch;
@@ -55,23 +56,22 @@ void walk_points(PatchWindow w, float receiver_z)
                     add_patch(low * scale, (low + pitch) * scale, 1.0);
             }
 }
-#endif
 
 vec4 visibility(Surface s)
 {
     PatchWindow w = patch_window(s);
     hidden_share = 0.0;
-#if P_layers > 1
+#ifdef LAYERED
     bits_begin(0);
 #endif
-#if P_mode == 0
-    walk_points(w, s.p.z);
-#else
-    walk_patches(w);
-    if (w.answer == UMBRA)
-        return vec4(0.0);
-#endif
-#if P_layers > 1
+    if (P(mode) == MODE_PAPER) {
+        walk_points(w, s.p.z);
+    } else {
+        walk_patches(w);
+        if (w.answer == UMBRA)
+            return vec4(0.0);
+    }
+#ifdef LAYERED
     hidden_share = 1.0 - bits_lit_share();
 #endif
     return scalar_visibility(clamp(1.0 - hidden_share / w.above, 0.0, 1.0));

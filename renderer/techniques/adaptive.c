@@ -36,7 +36,6 @@ static const struct pen_param rows[] = {
     PARAM(struct adaptive, mode, .choices = mode_names, .specialise = 1,
         .help = "Splits where it pays; always into 16 cells; never."),
     PARAM(struct adaptive, estimator, .def = ESTIMATOR_PCF, .choices = estimator_names,
-        .specialise = 1,
         .help = "Visibility of a cell: convolution shadow maps, as published, or comparisons."),
     PARAM(struct adaptive, theta, .def = 0.01, .min = -1, .max = 0.25,
         .help = "Least E - E^2 of a cell's visibility that splits it. 0.2244: as published; 0.25: "
@@ -88,11 +87,12 @@ static bool record(struct technique_run *run, struct pen_error *error)
 {
     const struct adaptive *params = run->params;
     const struct state *state = run->state;
-    struct pass_screen pass = {.name = "adaptive", .body = "adaptive.glsl"};
+    struct pass_screen pass = {.name = "adaptive", .body = "adaptive_pcf.glsl"};
     gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, COUNTS_BINDING, state->counts);
     if (params->estimator == ESTIMATOR_CSM) {
         struct convolution_desc desc = CONVOLUTION_DESC(params, true);
         desc.size = params->series_size;
+        pass.body = "adaptive_csm.glsl";
         return convolution_screen(run, &desc, pass, 1.5f * params->min_filter + 1, error);
     }
     const struct shadow_input *map = pass_caster_map(run, params->map_size, error);

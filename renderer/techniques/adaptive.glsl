@@ -4,82 +4,18 @@
 #include "receiver.glsl"
 #include "window.glsl"
 #include "taps.glsl"
-#include "convolution.glsl"
 #include "interleave_colour.glsl"
 
 layout(std430, binding = 1) buffer Counts {
     uint subdivided[2]; // pixels split once, twice
 };
 
-#if P_estimator == 0
-// Cells of the series: lookups at the same places at every level, so that levels agree.
-Receiver adaptive_receiver(Surface s)
-{
-    return series_receiver(s);
-}
-
-int adaptive_window(Receiver r, vec2 extent)
-{
-    return receiver_window(r, extent);
-}
-
+// Those of a cell estimator, in adaptive_csm.glsl or adaptive_pcf.glsl:
+Receiver adaptive_receiver(Surface s);
+int adaptive_window(Receiver r, vec2 extent);
 float adaptive_blocker_depth(
-    Receiver r, vec2 extent, vec2 shift, bool wanted, float nearest_z, float receiver_z)
-{
-    return blocker_depth(r, extent, wanted ? int(P(search_taps)) : 0, nearest_z, receiver_z);
-}
-
-float estimate(Receiver r, vec2 offset, vec2 extent, vec2 shift, int level)
-{
-    return window_visibility(r, offset, extent, max(int(P(taps)) >> level, 1));
-}
-#else
-// Cells of depth comparisons.
-Receiver adaptive_receiver(Surface s)
-{
-    return receiver_of(s, vec2(textureSize(shadow_map, 0)));
-}
-
-int adaptive_window(Receiver r, vec2 extent)
-{
-    return window_class(r.q, extent, r.plane, r.bias, 0.0, r.map_size);
-}
-
-// Four times the taps where the first ones find nothing although the pyramid cannot prove the window
-// lit: at the outer edge of a penumbra blockers fill a small part of it.
-float adaptive_blocker_depth(
-    Receiver r, vec2 extent, vec2 shift, bool wanted, float nearest_z, float receiver_z)
-{
-    float sum = 0.0, blockers = 0.0;
-    for (int round = 0; round < 2; round++) {
-        int count = int(P(pcf_search_taps)) << (2 * round);
-        Taps taps = taps_begin(count, shift);
-        count = wanted && blockers == 0.0 ? count : 0;
-        for (int i = 0; i < count; i++) {
-            vec2 offset = taps_next(taps) * extent;
-            float d = textureLod(shadow_map, light_uv(r.q + offset), 0.0).r;
-            if (d < plane_depth(r.plane, offset, r.bias)) {
-                sum += light_linear(d);
-                blockers += 1.0;
-            }
-        }
-    }
-    return blockers > 0.0 ? min(sum / blockers, receiver_z) : receiver_z;
-}
-
-float estimate(Receiver r, vec2 offset, vec2 extent, vec2 shift, int level)
-{
-    int count = max(int(P(pcf_taps)) >> level, 1);
-    Taps taps = taps_begin(count, shift);
-    float lit = 0.0;
-    for (int i = 0; i < count; i++) {
-        vec2 at = offset + taps_next(taps) * extent;
-        float d = textureLod(shadow_map, light_uv(r.q + at), 0.0).r;
-        lit += plane_depth(r.plane, at, r.bias) <= d ? 1.0 : 0.0;
-    }
-    return lit / float(count);
-}
-#endif
+    Receiver r, vec2 extent, vec2 shift, bool wanted, float nearest_z, float receiver_z);
+float estimate(Receiver r, vec2 offset, vec2 extent, vec2 shift, int level);
 
 // Means over a square of the light, centre in [-1, 1]^2: rgb emission, a of its squared channels.
 vec4 emission_moments(vec2 center, int level)
@@ -94,11 +30,8 @@ vec4 emission_moments(vec2 center, int level)
 // no seam shows.
 float split_weight(float visible, vec4 emission)
 {
-#if P_mode == 1
-    return 1.0;
-#elif P_mode == 2
-    return 0.0;
-#else
+    if (P(mode) != MODE_ADAPTIVE)
+        return P(mode) == MODE_FIXED2 ? 1.0 : 0.0;
     if (P(theta) < 0.0)
         return 1.0;
     float mean = dot(emission.rgb, emission.rgb) / 3.0;
@@ -107,7 +40,6 @@ float split_weight(float visible, vec4 emission)
         return 0.0;
     float variance = visible - visible * visible; // of a binary variable
     return clamp((variance - P(theta)) / max(P(blend), 1e-6), 0.0, 1.0);
-#endif
 }
 
 vec2 quarter(int i)

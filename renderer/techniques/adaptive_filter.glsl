@@ -25,7 +25,7 @@ vec4 visibility(Surface s)
     for (int i = 0; i < count; i++) {
         SampleMap map = page.samples[i];
         SampleView v = sample_view(r, map.at.xy);
-        float lit_share = sample_lit_box(maps, size, map, r, v);
+        float lit_share = sample_lit_box(maps, size, map, r, v, int(P(kernel)));
         float w = sample_weight(r, v) * map.layer.y * lit_share;
         vec3 e = light.textured != 0 ? light_emission(map.at.zw, map.layer.z) : vec3(1.0);
         sum += w * vec4(e, 1.0);

@@ -29,7 +29,7 @@ vec4 visibility(Surface s)
         vec3 e = light.textured != 0 ? light_emission(map.at.zw, map.layer.z) : vec3(1.0);
         all_sum += w;
         all_emission += w * e;
-#if KERNEL == 1
+#ifdef KERNEL_SINGLE
         int place = int(map.layer.w);
         float lit_share = float(words[place >> 4].x >> uint(place & 15) & 1u);
         lit_sum += w * lit_share;
@@ -40,7 +40,7 @@ vec4 visibility(Surface s)
         float v = seen && dark ? 0.0 : 1.0;
         return scalar_visibility(v);
     }
-#if KERNEL > 1
+#ifndef KERNEL_SINGLE
     vec4 sum = texelFetch(filtered, s.pixel, 0);
     lit_sum = sum.a;
     lit_emission = sum.rgb;

@@ -3,7 +3,6 @@
 #include "renderer/passes/light/sample_maps.h"
 #include "renderer/techniques/map_params.h"
 #include <math.h>
-#include <stdio.h>
 #include <string.h>
 
 #define MIN_MAX_SIZE 1024 /* texels of the map that is searched for blockers */
@@ -124,12 +123,6 @@ static void bind_bits(const struct state *state, struct pass_texture textures[BI
             state->bits[i].name ? state->bits[i].name : state->bits[0].name, GL_SAMPLE_NEAREST};
 }
 
-static void kernel_define(const struct technique_run *run, char defines[32])
-{
-    const struct adaptive_sampling *params = run->params;
-    snprintf(defines, 32, "#define KERNEL %u\n", params->kernel);
-}
-
 static struct sample_map entry_of(const struct refinement *r, uint32_t point, uint32_t layer)
 {
     float rect[4];
@@ -166,15 +159,13 @@ static bool test_page(
     struct state *state = run->state;
     gl.NamedFramebufferTextureLayer(state->framebuffer, GL_COLOR_ATTACHMENT0,
         state->bits[group].name, 0, (GLint)(number - group_first[group]));
-    char defines[32];
-    kernel_define(run, defines);
     struct pass_texture textures[] = {
         {UNIT_FREE + BIT_GROUPS, r->maps[number]->name, GL_SAMPLE_NEAREST_BORDER},
         {UNIT_MIN_MAX, r->min_max->textures[0].name, GL_SAMPLE_NEAREST}};
     return pass_screen(run,
         &(struct pass_screen){.name = "light tests",
             .body = "adaptive_test.glsl",
-            .defines = defines,
+            .defines = sample_map_kernel(params->kernel),
             .textures = textures,
             .texture_count = 2,
             .framebuffer = state->framebuffer,
@@ -321,9 +312,8 @@ static uint32_t fill_samples(
 static bool filter_pages(struct refinement *r, struct pen_error *error)
 {
     struct technique_run *run = r->run;
+    const struct adaptive_sampling *params = run->params;
     GLuint sum = pass_clear_sum(run);
-    char defines[32];
-    kernel_define(run, defines);
     for (uint32_t number = 0; number < r->pages; number++) {
         struct filter_block block = {.used = r->used};
         struct pass_texture textures[BIT_GROUPS + 1];
@@ -337,7 +327,7 @@ static bool filter_pages(struct refinement *r, struct pen_error *error)
         if (!pass_screen(run,
                 &(struct pass_screen){.name = "light filter",
                     .body = "adaptive_filter.glsl",
-                    .defines = defines,
+                    .defines = sample_map_kernel(params->kernel),
                     .textures = textures,
                     .texture_count = BIT_GROUPS + 1,
                     .framebuffer = sum,
@@ -354,10 +344,9 @@ static bool filter_pages(struct refinement *r, struct pen_error *error)
 static bool resolve(struct refinement *r, struct pen_error *error)
 {
     struct technique_run *run = r->run;
+    const struct adaptive_sampling *params = run->params;
     struct resolve_block block = {.used = r->used};
     struct pass_texture textures[BIT_GROUPS + 1];
-    char defines[32];
-    kernel_define(run, defines);
     block.count[0] = (int32_t)fill_samples(r, 0, r->pages, block.samples);
     block.count[1] = (int32_t)r->pages;
     run->result->shadow_maps += (uint32_t)block.count[0];
@@ -367,7 +356,7 @@ static bool resolve(struct refinement *r, struct pen_error *error)
     return pass_screen(run,
         &(struct pass_screen){.name = "light resolve",
             .body = "adaptive_resolve.glsl",
-            .defines = defines,
+            .defines = sample_map_kernel(params->kernel),
             .textures = textures,
             .texture_count = BIT_GROUPS + 1,
             .tiles = r->tiles,

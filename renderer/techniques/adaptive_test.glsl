@@ -22,7 +22,7 @@ vec4 visibility(Surface s)
     for (int i = 0; i < count; i++) {
         SampleMap map = test.samples[i];
         SampleView v = sample_view(r, map.at.xy);
-        float lit = sample_lit_box(maps, size, map, r, v);
+        float lit = sample_lit_box(maps, size, map, r, v, int(P(kernel)));
         uint bit = v.facing > 0.0 ? 1u << uint(map.layer.x) : 0u;
         bits |= uvec2(lit > 0.999 ? bit : 0u, lit < 0.001 ? bit : 0u);
     }

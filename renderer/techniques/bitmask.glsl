@@ -1,11 +1,7 @@
 // Schwarz and Stamminger 2007: as backprojection, but each map texel sets the bits of the emitter's
 // points that it hides, so that overlapping casters count once.
 #include "caster_patches.glsl"
-#if P_samples == 0
-#define LIGHT_BITS 64
-#else
-#define LIGHT_BITS 256
-#endif
+#define LIGHT_BITS (P(samples) == SAMPLES_64 ? 64 : 256)
 #include "light_bits.glsl"
 #ifdef TEXTURED
 layout(binding = 9) uniform sampler2D bit_emission; // (point, pattern)

@@ -136,6 +136,8 @@ static void make_views(struct technique_run *run, struct cascade *c)
     const struct cascaded *params = run->params;
     c->view_count = 0;
     c->block.count[0] = (int32_t)(c->side * c->side);
+    c->block.count[1] = (int32_t)c->kernel;
+    c->block.count[2] = (int32_t)c->side;
     for (uint32_t i = 0; i < c->side * c->side; i++) {
         float u, v, wu, wv, rect[4];
         cascade_sample_1d(params->weights, c->side, i % c->side, &u, &wu);
@@ -198,7 +200,8 @@ static bool add_cascade(struct technique_run *run, struct cascade *c,
         return false;
     run->result->shadow_maps += c->view_count;
     char defines[64];
-    snprintf(defines, sizeof defines, "#define KERNEL %u\n#define SIDE %u\n", c->kernel, c->side);
+    snprintf(defines, sizeof defines, "%s%s", sample_map_kernel(c->kernel),
+        c->kernel * c->side * c->side >= 48 ? "#define MANY_LEVELS\n" : "");
     struct pass_texture textures[] = {{UNIT_FREE, maps->textures[0].name, GL_SAMPLE_NEAREST_BORDER},
         {UNIT_MIN_MAX, min_max->textures[0].name, GL_SAMPLE_NEAREST}};
     return pass_screen(run,

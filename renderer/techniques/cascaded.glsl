@@ -5,7 +5,7 @@
 layout(binding = 7) uniform sampler2DArray maps;
 layout(std140, binding = 3) uniform CascadeBlock {
     SampleMap samples[64];
-    ivec4 count; // x: samples
+    ivec4 count; // x: samples, y: side of the kernel, z: samples along a side of the emitter
     vec4 fade;   // in from x to y, out from z to w, m of view distance
 } cascade;
 
@@ -20,7 +20,7 @@ vec2 kernel_extent(SampledReceiver r, vec2 size, vec2 q)
 {
     float nearest_z, sum = 0.0, blockers = 0.0;
     vec2 texel = (light.rect.zw - light.rect.xy) / vec2(2 * textureSize(min_max_pyramid, 0));
-    vec2 search = min_max_search_extent(q, r.p.z, texel, nearest_z) / float(SIDE);
+    vec2 search = min_max_search_extent(q, r.p.z, texel, nearest_z) / float(cascade.count.z);
     int count = nearest_z < r.p.z ? cascade.count.x : 0;
     for (int i = 0; i < count; i++) {
         SampleMap map = cascade.samples[i];
@@ -36,28 +36,29 @@ vec2 kernel_extent(SampledReceiver r, vec2 size, vec2 q)
     }
     if (blockers == 0.0)
         return vec2(-1.0);
-    return light_filter_extent(min(sum / blockers, r.p.z), r.p.z) / float(SIDE);
+    return light_filter_extent(min(sum / blockers, r.p.z), r.p.z) / float(cascade.count.z);
 }
 
-// KERNEL^2 taps over +- extent around the sample's view of the receiver, at least +- a texel. The
-// samples shift their taps against each other, so that straight edges get KERNEL * SIDE * SIDE levels;
-// where that is few, each comparison is interpolated too.
+// kernel^2 taps over +- extent around the sample's view of the receiver, at least +- a texel. The
+// samples shift their taps against each other, so that straight edges get kernel * side * side levels;
+// where that is few (not MANY_LEVELS), each comparison is interpolated too.
 float lit_bridged(vec2 size, SampleMap map, SampledReceiver r, SampleView v, vec2 extent, int i)
 {
-    vec2 spacing = 2.0 / float(KERNEL) * max(extent, 1.0 / (size * map.window.xy));
-    vec2 shift = (vec2(i / SIDE, i % SIDE) + 0.5) / float(SIDE) - 0.5 * float(KERNEL);
+    int kernel = cascade.count.y, side = cascade.count.z;
+    vec2 spacing = 2.0 / float(kernel) * max(extent, 1.0 / (size * map.window.xy));
+    vec2 shift = (vec2(i / side, i % side) + 0.5) / float(side) - 0.5 * float(kernel);
     float sum = 0.0;
-    for (int y = 0; y < KERNEL; y++)
-        for (int x = 0; x < KERNEL; x++) {
+    for (int y = 0; y < kernel; y++)
+        for (int x = 0; x < kernel; x++) {
             vec2 offset = (shift + vec2(x, y)) * spacing;
-#if KERNEL * SIDE * SIDE >= 48
+#ifdef MANY_LEVELS
             vec2 d = sample_depths(maps, size, map, r, v, offset);
             sum += d.y <= d.x ? 1.0 : 0.0;
 #else
             sum += sample_lit_bilinear(maps, size, map, r, v, offset);
 #endif
         }
-    return sum / float(KERNEL * KERNEL);
+    return sum / float(kernel * kernel);
 }
 
 vec4 visibility(Surface s)
@@ -70,7 +71,7 @@ vec4 visibility(Surface s)
     vec2 size = vec2(textureSize(maps, 0).xy), q = light_project(s.p), extent = vec2(0.0);
     SampledReceiver r = sampled_receiver(s, P(bias));
     int count = cascade.count.x;
-#if KERNEL > 1
+#ifndef KERNEL_SINGLE
     if (P(filter) == FILTER_BRIDGE) {
         extent = kernel_extent(r, size, q);
         count = extent.x < 0.0 ? 0 : count; // a dynamic bound skips the loop, a return would not
@@ -84,12 +85,12 @@ vec4 visibility(Surface s)
         SampleView v = sample_view(r, map.at.xy);
         float w = sample_weight(r, v) * map.layer.y, lit = 1.0;
         if (map.layer.x >= 0.0) {
-#if KERNEL > 1
+#ifndef KERNEL_SINGLE
             if (P(filter) == FILTER_BRIDGE)
                 lit = lit_bridged(size, map, r, v, extent, i);
             else
 #endif
-                lit = sample_lit_box(maps, size, map, r, v);
+                lit = sample_lit_box(maps, size, map, r, v, cascade.count.y);
         }
         all_sum += w;
         lit_sum += w * lit;

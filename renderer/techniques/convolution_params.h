@@ -7,7 +7,6 @@
 
 #define CONVOLUTION_ROWS(aggregate, default_terms, default_storage)                                \
     PARAM(aggregate, terms, .def = default_terms, .min = 1, .max = CONVOLUTION_MAX_TERMS,          \
-        .specialise = 1,                                                                           \
         .help = "Terms of the series; more make contacts sharper and the maps larger."),           \
         PARAM(aggregate, damping, .def = 0.1, .min = 0, .max = 4,                                  \
             .help = "Damps high terms against ringing; 0 keeps the bare series."),                 \

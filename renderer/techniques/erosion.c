@@ -27,7 +27,7 @@ static const struct pen_param rows[] = {
     BIAS_ROW(struct erosion),
     PARAM(struct erosion, max_radius, .def = 256, .min = 2, .max = 512, .unit = "px",
         .help = "Largest half width of a penumbra on the screen."),
-    PARAM(struct erosion, filter_taps, .def = 32, .min = 1, .max = 256, .specialise = 1,
+    PARAM(struct erosion, filter_taps, .def = 32, .min = 1, .max = 256,
         .help = "Depth comparisons of the filter; variant pcf."),
     PARAM(struct erosion, min_filter, .def = 1, .min = 0, .max = 16, .unit = "texel",
         .help = "Least half width of the filter; variant pcf."),

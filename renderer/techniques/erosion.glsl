@@ -47,7 +47,7 @@ vec4 visibility(Surface s)
     // Where the light's centre sees the receiver's back there is no edge to grow from, and all that
     // may block counts.
     bool turned = back.depth > 0.0 && hard.z > 0.0;
-    int count = turned || w > 0.0 ? P(filter_taps) : 0;
+    int count = turned || w > 0.0 ? int(P(filter_taps)) : 0;
 
     vec2 q = light_project(s.p), texel = light_texel(shadow_map);
     if (w > 0.0)
@@ -61,7 +61,7 @@ vec4 visibility(Surface s)
     vec2 shift = vec2(0.5);
 #endif
     float filtered =
-        light_pcf(s, plane, back, light_uv(q), extent, bias, count, P(filter_taps), shift);
+        light_pcf(s, plane, back, light_uv(q), extent, bias, count, int(P(filter_taps)), shift);
     float v = count > 0 ? filtered : max(hard.x, 0.0);
 #ifdef INTERLEAVED
     return vec4(v, count > 0 ? 2.0 * w * hard.w : 0.0, 0.0, 1.0);

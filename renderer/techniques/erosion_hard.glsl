@@ -20,18 +20,18 @@ vec4 visibility(Surface s)
     float bound = search.dark ? 0.0 : window_scale(min(search.nearest_z, s.p.z), s.p.z);
     mat2 pixels = pixels_per_map(s);
     bool silhouette = true;
-#if P_variant == 1
-    // An edge of the shadow belongs to a silhouette when the 3 x 3 Laplacian finds it in the shadow
-    // map too, a pixel of the receiver's own plane to each side; where an object in front merely
-    // ends, all of them are blocked.
-    mat2 map = inverse(pixels);
-    silhouette = false;
-    for (int i = 0; i < 4; i++) {
-        vec2 offset = (i & 1) == 0 ? map[i >> 1] : -map[i >> 1];
-        float d = texture(shadow_map, light_uv(q + offset)).r;
-        silhouette = silhouette || plane_depth(plane, offset, bias) <= d;
+    if (P(variant) == VARIANT_DIRECT) {
+        // An edge of the shadow belongs to a silhouette when the 3 x 3 Laplacian finds it in the
+        // shadow map too, a pixel of the receiver's own plane to each side; where an object in front
+        // merely ends, all of them are blocked.
+        mat2 map = inverse(pixels);
+        silhouette = false;
+        for (int i = 0; i < 4; i++) {
+            vec2 offset = (i & 1) == 0 ? map[i >> 1] : -map[i >> 1];
+            float d = texture(shadow_map, light_uv(q + offset)).r;
+            silhouette = silhouette || plane_depth(plane, offset, bias) <= d;
+        }
     }
-#endif
     float w = window_scale(min(light_linear(depth), s.p.z), s.p.z);
     vec2 x = abs(pixels[0]) * window_extent.x, y = abs(pixels[1]) * window_extent.y;
     float reach = min(max(x.x + y.x, x.y + y.y), 60000.0);

@@ -16,7 +16,7 @@ static const struct pen_param rows[] = {
     BIAS_ROW(struct mssm),
     PARAM(struct mssm, kernel_bias, .def = 0, .min = 0, .max = 1,
         .help = "Share of a sloped receiver's depth within the window that its bias follows."),
-    PARAM(struct mssm, parts, .def = 2, .min = 1, .max = 4, .specialise = 1,
+    PARAM(struct mssm, parts, .def = 2, .min = 1, .max = 4,
         .help =
             "Parts per side of a window, each with moments of its own; 1: the published method."),
     PARAM(struct mssm, moment_bias, .def = 6e-6, .min = 0, .max = 0.01,

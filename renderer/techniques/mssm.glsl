@@ -50,7 +50,7 @@ vec4 visibility(Surface s)
         vec2 size = high - low;
         // What lies outside the map is lit.
         float inside = size.x * size.y * texel.x * texel.y / (4.0 * extent.x * extent.y);
-        int parts = min(size.x, size.y) < 2.0 * float(P(parts)) ? 1 : P(parts);
+        int parts = min(size.x, size.y) < 2.0 * float(P(parts)) ? 1 : int(P(parts));
         parts = min(size.x, size.y) > 1e-3 ? parts : 0;
         vec2 step = size / float(max(parts, 1)), sum = vec2(0.0);
         for (int k = 0; k < parts * parts; k++) {

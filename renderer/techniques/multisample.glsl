@@ -17,13 +17,12 @@ vec4 visibility(Surface s)
         SampleView v = sample_view(r, map.at.xy);
         float lit = sample_lit(maps, size, map, r, v);
         // Light below the receiver's horizon is left out of the mean: irradiance is clipped there.
-#if P_weighting == 1
-        vec3 to = vec3(map.at.xy, 0.0) - s.p;
-        float d2 = dot(to, to), f = max(v.facing, 0.0);
-        float w = light_parallel ? f : f * s.p.z / (d2 * d2);
-#else
         float w = sample_weight(r, v);
-#endif
+        if (P(weighting) == WEIGHTING_G) {
+            vec3 to = vec3(map.at.xy, 0.0) - s.p;
+            float d2 = dot(to, to), f = max(v.facing, 0.0);
+            w = light_parallel ? f : f * s.p.z / (d2 * d2);
+        }
         sum += light.textured != 0
             ? vec4(light_emission(map.at.zw, 0.0) * w * lit, w)
             : vec4(w * lit, 0.0, 0.0, w);

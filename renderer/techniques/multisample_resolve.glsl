@@ -6,9 +6,8 @@ vec4 visibility(Surface s)
     vec4 sum = texelFetch(accumulated, s.pixel, 0);
     // A textured light's mean visibility is that of its luminance: there is no fifth channel.
     sum.rgb /= max(sum.a, 1e-20);
-#if P_weighting == 0
-    sum.rgb *= horizon_fade(horizon_share(s.p, s.n));
-#endif
+    if (P(weighting) == WEIGHTING_AREA)
+        sum.rgb *= horizon_fade(horizon_share(s.p, s.n));
     if (light.textured == 0)
         return scalar_visibility(sum.r);
     const vec3 luminance = vec3(0.2126, 0.7152, 0.0722);

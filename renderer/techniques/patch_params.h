@@ -10,7 +10,7 @@
             "Map texels across the light's image on each caster's depth: the finest mip level "    \
             "that is walked has at least as many.")
 #define LAYERS_ROW(aggregate)                                                                      \
-    PARAM(aggregate, layers, .def = 1, .min = 1, .max = PEEL_MAX_LAYERS, .specialise = 1,          \
+    PARAM(aggregate, layers, .def = 1, .min = 1, .max = PEEL_MAX_LAYERS,                           \
         .help = "Depth layers of casters, by depth peeling.")
 #define MIN_FILTER_ROW(aggregate)                                                                  \
     PARAM(aggregate, min_filter, .def = 1, .min = 0.5, .max = 16, .unit = "texel",                 \

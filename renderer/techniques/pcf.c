@@ -14,8 +14,7 @@ static const struct pen_param rows[] = {
     BIAS_ROW(struct pcf),
     PARAM(struct pcf, radius, .def = 1.5, .min = 0.5, .max = 64, .unit = "texel",
         .help = "Half width of the filter."),
-    PARAM(struct pcf, taps, .def = 16, .min = 1, .max = 64, .specialise = 1,
-        .help = "Depth comparisons per pixel."),
+    PARAM(struct pcf, taps, .def = 16, .min = 1, .max = 64, .help = "Depth comparisons per pixel."),
 };
 
 static bool record(struct technique_run *run, struct pen_error *error)

@@ -15,9 +15,9 @@ struct pcss {
 static const struct pen_param rows[] = {
     MAP_SIZE_ROW(struct pcss, 2048),
     BIAS_ROW(struct pcss),
-    PARAM(struct pcss, search_taps, .def = 16, .min = 1, .max = 64, .specialise = 1,
+    PARAM(struct pcss, search_taps, .def = 16, .min = 1, .max = 64,
         .help = "Samples used to find the average blocker depth."),
-    PARAM(struct pcss, filter_taps, .def = 32, .min = 1, .max = 256, .specialise = 1,
+    PARAM(struct pcss, filter_taps, .def = 32, .min = 1, .max = 256,
         .help = "Depth comparisons of the filter."),
     PARAM(struct pcss, min_filter, .def = 1, .min = 0, .max = 16, .unit = "texel",
         .help = "Least half width of the filter."),

@@ -15,8 +15,8 @@ vec4 visibility(Surface s)
 
     float nearest_z;
     vec2 search = min_max_search_extent(q, s.p.z, texel, nearest_z);
-    int search_count = nearest_z < s.p.z ? P(search_taps) : 0;
-    Taps taps = taps_begin(P(search_taps), shift);
+    int search_count = nearest_z < s.p.z ? int(P(search_taps)) : 0;
+    Taps taps = taps_begin(int(P(search_taps)), shift);
     float sum = 0.0, blockers = 0.0;
     for (int i = 0; i < search_count; i++) {
         vec2 offset = taps_next(taps) * search;
@@ -30,8 +30,8 @@ vec4 visibility(Surface s)
     // (software rasterisers run all lanes to the end).
     float caster_z = min(sum / max(blockers, 1.0), s.p.z);
     vec2 extent = max(light_filter_extent(caster_z, s.p.z), P(min_filter) * texel);
-    int count = blockers > 0.0 ? P(filter_taps) : 0;
-    float v = light_pcf(s, plane, back, uv, extent, bias, count, P(filter_taps), shift);
+    int count = blockers > 0.0 ? int(P(filter_taps)) : 0;
+    float v = light_pcf(s, plane, back, uv, extent, bias, count, int(P(filter_taps)), shift);
 #ifdef INTERLEAVED
     // Width of the penumbra on the screen, F5, for the averaging pass.
     float scale = light_parallel ? 1.0 : s.p.z / light.near_z;

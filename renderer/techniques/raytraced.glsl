@@ -9,9 +9,8 @@ vec4 visibility(Surface s)
 #ifdef VARIANCE
     t = texelFetch(standard_error, s.pixel, 0).rrrr;
 #endif
-#if P_weighting == 0
-    t /= horizon_weight(horizon_share(s.p, s.n));
-#endif
+    if (P(weighting) == WEIGHTING_AREA)
+        t /= horizon_weight(horizon_share(s.p, s.n));
     t = clamp(t, 0.0, 1.0);
 #ifdef VARIANCE
     t *= t;

@@ -15,7 +15,7 @@ struct stochastic {
 };
 
 static const struct pen_param rows[] = {
-    PARAM(struct stochastic, samples, .def = 4, .min = 1, .max = 16, .specialise = 1,
+    PARAM(struct stochastic, samples, .def = 4, .min = 1, .max = 16,
         .help = "Light samples per pixel and frame."),
     PARAM(struct stochastic, maps, .def = 32, .min = 1, .max = LIGHT_SAMPLES_MOST,
         .help = "Shadow maps, each from a point of the light, that pixels choose from."),

@@ -23,9 +23,9 @@ static const struct pen_param rows[] = {
     PARAM(struct vssm, subdivide, .choices = subdivide_names, .specialise = 1,
         .help = "Splits windows that mean and variance do not describe: where needed, always, or "
                 "never."),
-    PARAM(struct vssm, levels, .def = 1, .min = 1, .max = 4, .specialise = 1,
+    PARAM(struct vssm, levels, .def = 1, .min = 1, .max = 4,
         .help = "Times a window is halved at most."),
-    PARAM(struct vssm, leaf_grid, .def = 2, .min = 1, .max = 4, .specialise = 1,
+    PARAM(struct vssm, leaf_grid, .def = 2, .min = 1, .max = 4,
         .help = "Side of the grid of depth comparisons in a part that cannot be split further."),
     PARAM(struct vssm, tolerance, .def = 0.2, .min = 0, .max = 1000,
         .help = "How far a part may be from two planes, relative to their distance, before it is "

@@ -83,8 +83,9 @@ Share compare(vec2 low, vec2 high, vec2 shift, vec2 extent, Receiver r)
     vec2 texel = sat_texel(), map_texel = light_texel(shadow_map);
     // Depth within a texel differs from its centre's by half a texel along the slope.
     float bias = r.bias.y + 0.5 * dot(abs(r.plane.gradient), map_texel);
-    for (int i = 0; i < P(leaf_grid) * P(leaf_grid); i++) {
-        vec2 at = (vec2(i % P(leaf_grid), i / P(leaf_grid)) + shift) / float(P(leaf_grid));
+    int grid = int(P(leaf_grid));
+    for (int i = 0; i < grid * grid; i++) {
+        vec2 at = (vec2(i % grid, i / grid) + shift) / float(grid);
         vec2 l = (floor(mix(low, high, at) * texel / map_texel) + 0.5) * map_texel;
         l += light.rect.xy;
         vec2 offset = l - r.q;
@@ -96,7 +97,7 @@ Share compare(vec2 low, vec2 high, vec2 shift, vec2 extent, Receiver r)
         share.blocked += blocked ? weight : 0.0;
         share.blocker_depth += blocked ? weight * depth_unit(d) : 0.0;
     }
-    float scale = 1.0 / float(P(leaf_grid) * P(leaf_grid));
+    float scale = 1.0 / float(grid * grid);
     return Share(share.lit * scale, share.blocked * scale, share.blocker_depth * scale);
 }
 
@@ -108,8 +109,8 @@ int even_bits(int m) // of a Morton number
 // Walks the quadtree over q +- extent depth-first. What lies outside the map is lit.
 Share window_share(vec2 extent, bool exact, vec2 shift, Receiver r)
 {
-    const int first = P(subdivide) == SUBDIVIDE_UNIFORM ? P(levels) : 0;
-    const int last = P(subdivide) == SUBDIVIDE_OFF ? 0 : P(levels);
+    int first = P(subdivide) == SUBDIVIDE_UNIFORM ? int(P(levels)) : 0;
+    int last = P(subdivide) == SUBDIVIDE_OFF ? 0 : int(P(levels));
     vec2 texel = sat_texel();
     vec2 low = clamp((r.q - extent - light.rect.xy) / texel, 0.0, sat_info.y);
     vec2 high = clamp((r.q + extent - light.rect.xy) / texel, 0.0, sat_info.y);

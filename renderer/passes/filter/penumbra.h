@@ -6,7 +6,7 @@
 
 /* Rows that the blocker search needs, of an aggregate with these fields. */
 #define PENUMBRA_ROWS(aggregate, default_taps)                                                     \
-    PARAM(aggregate, search_taps, .def = default_taps, .min = 1, .max = 64, .specialise = 1,       \
+    PARAM(aggregate, search_taps, .def = default_taps, .min = 1, .max = 64,                        \
         .help = "Samples used to find the average blocker depth."),                                \
         PARAM(aggregate, min_filter, .def = 1, .min = 0, .max = 16, .unit = "texel",               \
             .help = "Least half width of the penumbra.")

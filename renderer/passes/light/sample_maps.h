@@ -29,6 +29,12 @@ struct sample_map {
 struct sample_map sample_map_entry(
     const struct sample_point *point, const float rect[4], uint32_t layer);
 
+/* What sample_lit_box compares: a texel, four, or more. Only that changes the shader. */
+static inline const char *sample_map_kernel(uint32_t side)
+{
+    return side == 1 ? "#define KERNEL_SINGLE\n" : side == 2 ? "#define KERNEL_BILINEAR\n" : "";
+}
+
 /* Draws the casters seen from point[0 .. count) through rect[i] into layer[i] of a D32F array. */
 struct sample_view {
     struct sample_point point;

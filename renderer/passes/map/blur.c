@@ -1,6 +1,5 @@
 #include "renderer/passes/map/blur.h"
 #include <math.h>
-#include <stdio.h>
 
 struct blur_block {
     float step[4], weights[BLUR_MAX_RADIUS + 1];
@@ -21,15 +20,13 @@ static bool run(struct technique_ctx *ctx, const struct gl_texture *from, GLuint
     uint32_t radius, int axis, struct pen_error *error)
 {
     struct blur_block block = {0};
-    char defines[32];
-    snprintf(defines, sizeof defines, "#define RADIUS %u\n", radius);
     block.step[axis] = 1 / (float)(axis ? from->height : from->width);
+    block.step[2] = (float)radius;
     blur_weights(radius, block.weights);
     struct pass_texture source = {UNIT_FREE, from->name, GL_SAMPLE_NEAREST};
     return pass_fill(ctx,
         &(struct pass_fill){.name = "blur",
             .fragment = "blur.frag",
-            .defines = defines,
             .stage = PEN_STAGE_SHADOW,
             .textures = &source,
             .texture_count = 1,

@@ -1,10 +1,10 @@
-// Occlusion bits of the emitter's points (passes/light/light_bits.h). LIGHT_BITS is 64 or 256; patches
-// that overlap set the same bits, so casters behind one another count once.
+// Occlusion bits of the emitter's points (passes/light/light_bits.h). LIGHT_BITS, an expression, is 64
+// or 256; patches that overlap set the same bits, so casters behind one another count once.
 layout(binding = 8) uniform usampler2DArray bits_below; // (step, 2 pattern + axis, 128 bits)
-const int BIT_LAYERS = LIGHT_BITS == 256 ? 2 : 1;
+#define BIT_LAYERS (LIGHT_BITS == 256 ? 2 : 1)
 const float BIT_STEPS = 512.0;
 
-uvec4 hidden_bits[BIT_LAYERS]; // 64: xy
+uvec4 hidden_bits[2]; // 64: xy of the first
 int bit_pattern;
 
 void bits_begin(int pattern)

@@ -10,8 +10,8 @@ vec2 blocker_extent(Surface s, ReceiverPlane plane, BlockerSearch search, vec2 u
     float bias)
 {
     vec2 inverse_size = 1.0 / (light.rect.zw - light.rect.xy);
-    int count = search.lit || search.dark ? 0 : P(search_taps);
-    Taps taps = taps_begin(P(search_taps), vec2(0.5));
+    int count = search.lit || search.dark ? 0 : int(P(search_taps));
+    Taps taps = taps_begin(int(P(search_taps)), vec2(0.5));
     float sum = 0.0, blockers = 0.0;
     for (int i = 0; i < count; i++) {
         vec2 offset = taps_next(taps) * search.extent;

@@ -4,7 +4,8 @@
 //
 // The window comes from the bounds of depth in the pyramid, which is then walked as a quadtree: a
 // node without a caster or beside the light ends there, and one whose depths barely differ, or that
-// is smaller than 1 / P(kernel) of the light as seen past it, is a single caster.
+// is smaller than 1 / P(kernel) of the light as seen past it, is a single caster. PATCHES_APART: the
+// method has no rows P(fill) and P(gap), and leaves gaps between casters alone.
 layout(binding = 7) uniform sampler2DArray caster_maps; // hardware depth, nearest layer first
 #define MIN_MAX_LAYERED
 #include "min_max.glsl"
@@ -73,7 +74,7 @@ float caster_depth(ivec2 at, int layer)
     return any(greaterThanEqual(at, size)) ? 1.0 : d;
 }
 
-#if P_fill != 0 // none
+#ifndef PATCHES_APART
 // Slopes are seen as steps. When a neighbour is a caster at about the same depth, the two share
 // their border: `extend` (Guennebaud et al. 2006) closes gaps, `join` also undoes overlaps.
 float filled_border(PatchWindow w, ivec2 neighbour, int layer, int level, float limit, float d,
@@ -86,9 +87,8 @@ float filled_border(PatchWindow w, ivec2 neighbour, int layer, int level, float 
     float scale = light_parallel ? 1.0 : light.far_z / (light.far_z - light.near_z) - d;
     bool near = its < limit && abs(its - d) < P(gap) * scale;
     float shared_border = border / max(w.depth - its, 1e-20);
-#if P_fill == 1
-    shared_border = min(own, shared_border);
-#endif
+    if (P(fill) == FILL_EXTEND)
+        shared_border = min(own, shared_border);
     return near ? shared_border : own;
 }
 #endif
@@ -141,9 +141,11 @@ void walk_quadtree(inout PatchWindow w, int layer, ivec2 root, int root_level)
             float depth = whole ? d.z : mixed ? d.x : middle;
             float below = max(w.depth - depth, 1e-20);
             vec2 a = low / below, b = high / below;
-#if P_fill != 0
-            a.x = filled_border(w, at - ivec2(1, 0), layer, level, limit, depth, low.x, a.x);
-            a.y = filled_border(w, at - ivec2(0, 1), layer, level, limit, depth, low.y, a.y);
+#ifndef PATCHES_APART
+            if (P(fill) != FILL_NONE) {
+                a.x = filled_border(w, at - ivec2(1, 0), layer, level, limit, depth, low.x, a.x);
+                a.y = filled_border(w, at - ivec2(0, 1), layer, level, limit, depth, low.y, a.y);
+            }
 #endif
             if (depth < limit && depth > back) {
                 add_patch(a, b, share);
@@ -177,7 +179,7 @@ void walk_patches(inout PatchWindow w)
     last >>= root;
     if (w.answer != PENUMBRA)
         last = first - 1;
-    for (int layer = 0; layer < P(layers); layer++)
+    for (int layer = 0; layer < int(P(layers)); layer++)
         for (int v = first.y; v <= last.y; v++)
             for (int u = first.x; u <= last.x; u++)
                 walk_quadtree(w, layer, ivec2(u, v), root);

@@ -15,7 +15,7 @@ layout(std140, binding = 3) uniform ConvolutionBlock {
     float table_scale;
 } series;
 
-#define LAYERS ((P(terms) + 1) / 2)
+#define LAYERS (int(P(terms) + 1u) / 2)
 
 vec2 turned(vec2 a, vec2 b) // product of complex numbers
 {
@@ -91,8 +91,8 @@ vec2 series_lookup(float depth, Kernel kernel, bool weighted)
     vec2 phase = vec2(cos(angle), sin(angle)), turn = turned(phase, phase);
     vec2 sum = vec2(0.5, 0.0);
     if (weighted)
-        sum.y = 0.5 * kernel_mean(basis_weighted, int(LAYERS), kernel).r;
-    for (int i = 0; i < int(LAYERS); i++) {
+        sum.y = 0.5 * kernel_mean(basis_weighted, LAYERS, kernel).r;
+    for (int i = 0; i < LAYERS; i++) {
         vec2 next = turned(phase, turn);
         vec4 weight = series.weight[i >> 1];
         vec2 w = (i & 1) == 0 ? weight.xy : weight.zw;
@@ -110,7 +110,7 @@ float series_step(float x)
 {
     float angle = 3.14159265 * x, sum = 0.5;
     vec2 phase = vec2(cos(angle), sin(angle)), turn = turned(phase, phase);
-    for (int i = 0; i < int(LAYERS); i++) {
+    for (int i = 0; i < LAYERS; i++) {
         vec4 weight = series.weight[i >> 1];
         vec2 w = (i & 1) == 0 ? weight.xy : weight.zw;
         vec2 next = turned(phase, turn);
@@ -199,15 +199,17 @@ float cell_visibility(Receiver r, float f, float depth, vec2 offset, vec2 extent
 #ifdef RAW
     return f;
 #else
-    float low = series.low, high = series.low + 1.0 / series.scale;
+    float low = series.low, range = 1.0 / series.scale;
     if (P(contact)) {
+        float high = low + range;
         float nearest = min(min_max_window(r.q + offset, extent).x, light.far_z);
         float z = (nearest - light.near_z) / (light.far_z - light.near_z) * series.range;
         float x = z - depth + series.offset;
         if (x > -series.offset)
             low = max(low, min(series_step(x), high - 0.5));
+        range = high - low;
     }
-    return clamp((f - low) / (high - low), 0.0, 1.0);
+    return clamp((f - low) / range, 0.0, 1.0);
 #endif
 }
 

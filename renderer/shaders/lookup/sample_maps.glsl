@@ -94,30 +94,31 @@ float sample_lit_bilinear(sampler2DArray maps, vec2 size, SampleMap map, Sampled
     return mix(mix(lit.w, lit.z, f.x), mix(lit.x, lit.y, f.x), f.y);
 }
 
-#ifdef KERNEL
-// Mean of the comparison over a square of KERNEL - 1 texels around v.l, which KERNEL^2 texels cover:
-// those at the border count for the part inside. KERNEL 2 is bilinear filtering, 1 a single texel.
-float sample_lit_box(sampler2DArray maps, vec2 size, SampleMap map, SampledReceiver r, SampleView v)
+// Mean of the comparison over a square of kernel - 1 texels around v.l, which kernel^2 texels cover:
+// those at the border count for the part inside. 2 is bilinear filtering, 1 a single texel; which of
+// the three it is, KERNEL_SINGLE, KERNEL_BILINEAR or neither, is the pass's (sample_map_kernel).
+float sample_lit_box(sampler2DArray maps, vec2 size, SampleMap map, SampledReceiver r, SampleView v,
+    int kernel)
 {
-#if KERNEL == 1
+#if defined(KERNEL_SINGLE)
     return sample_lit(maps, size, map, r, v);
-#elif KERNEL == 2
+#elif defined(KERNEL_BILINEAR)
     return sample_lit_bilinear(maps, size, map, r, v, vec2(0.0));
 #else
-    vec2 low = (v.l * map.window.xy + map.window.zw) * size - 0.5 * float(KERNEL - 1);
+    int last = kernel - 1;
+    vec2 low = (v.l * map.window.xy + map.window.zw) * size - 0.5 * float(last);
     vec2 base = floor(low), f = low - base, metres = 1.0 / (size * map.window.xy);
-    vec2 first = (base + 0.5 - low - 0.5 * float(KERNEL - 1)) * metres;
+    vec2 first = (base + 0.5 - low - 0.5 * float(last)) * metres;
     float dark = 0.0; // summed instead of light, so that no rounding darkens what is lit
-    for (int y = 0; y < KERNEL; y++) {
-        float wy = y == 0 ? 1.0 - f.y : y == KERNEL - 1 ? f.y : 1.0;
-        for (int x = 0; x < KERNEL; x++) {
-            float wx = x == 0 ? 1.0 - f.x : x == KERNEL - 1 ? f.x : 1.0;
+    for (int y = 0; y <= last; y++) {
+        float wy = y == 0 ? 1.0 - f.y : y == last ? f.y : 1.0;
+        for (int x = 0; x <= last; x++) {
+            float wx = x == 0 ? 1.0 - f.x : x == last ? f.x : 1.0;
             vec2 at = vec2(x, y);
             float d = texture(maps, vec3((base + at + 0.5) / size, map.layer.x)).r;
             dark += sample_plane(r, v, first + at * metres) <= d ? 0.0 : wx * wy;
         }
     }
-    return max(1.0 - dark / float((KERNEL - 1) * (KERNEL - 1)), 0.0);
+    return max(1.0 - dark / float(last * last), 0.0);
 #endif
 }
-#endif

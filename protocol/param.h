@@ -32,7 +32,8 @@ struct pen_param {
     uint16_t offset;    /* bytes from the start of the struct */
     uint8_t type;       /* enum pen_param_type */
     uint8_t count;      /* components, 1 to 4 */
-    uint8_t specialise; /* 1: a compile-time constant of the shader, part of its cache key */
+    uint8_t specialise; /* 1: a constant of the shader, one program per value: for what chooses its
+                           code, not for counts and sizes */
     uint8_t exclusive_min; /* 1: min itself is not allowed */
 };
 

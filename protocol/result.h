@@ -29,6 +29,13 @@ struct pen_device_info {
     uint32_t software;  /* 1: no GPU behind it */
 };
 
+/* Compiled shader programs of a renderer, since it started. */
+struct pen_program_counts {
+    uint64_t bytes; /* of those kept; estimated from their texts */
+    uint32_t kept, compiled, evicted;
+    uint32_t reserved;
+};
+
 /* How far a picture is from its reference; see renderer/metrics/metrics.h. */
 struct pen_comparison {
     double rmse, penumbra_rmse, mean_error, largest; /* of the mean visibility */
@@ -57,6 +64,7 @@ struct pen_result {
     uint64_t rays;        /* of methods that trace */
     uint64_t gpu_bytes;   /* resident scenes, images and shadow inputs */
     uint64_t image_bytes; /* encoded size */
+    struct pen_program_counts programs;
     struct pen_comparison comparison; /* all 0 unless a reference was given */
 };
 void pen_result_warn(struct pen_result *result, const char *format, ...)

@@ -64,7 +64,7 @@ struct pen_renderer *pen_renderer_create(
     r->budget = config->gpu_memory_bytes ? config->gpu_memory_bytes : 1ull << 30;
     r->ctx.gpu_memory = r->budget;
     r->ctx.shadow_memory = r->budget / 2;
-    r->ctx.programs = gl_programs_create();
+    r->ctx.programs = gl_programs_create(config->programs);
     r->ctx.shadows = shadow_cache_create();
     r->emissions = emission_cache_create();
     gl_samplers_init(&r->ctx.samplers);
@@ -145,6 +145,11 @@ static uint64_t scene_bytes(const struct pen_renderer *r)
 uint64_t pen_renderer_gpu_bytes(const struct pen_renderer *r)
 {
     return scene_bytes(r) + shadow_cache_bytes(r->ctx.shadows) + emission_cache_bytes(r->emissions);
+}
+
+struct pen_program_counts pen_renderer_programs(const struct pen_renderer *r)
+{
+    return gl_programs_counts(r->ctx.programs);
 }
 
 static void remove_scene(struct pen_renderer *r, uint32_t i)
@@ -266,7 +271,9 @@ bool pen_renderer_render(struct pen_renderer *r, const struct pen_request *reque
     bool ok = frame_render(&job, frame, result, error);
     evict(r, scene);
     emission_cache_trim(r->emissions, EMISSION_BYTES);
+    gl_programs_end_frame(r->ctx.programs);
     result->gpu_bytes = pen_renderer_gpu_bytes(r);
+    result->programs = gl_programs_counts(r->ctx.programs);
     GLenum gl_error = gl.GetError();
     if (ok && gl_error == GL_NO_ERROR)
         return true;

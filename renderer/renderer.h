@@ -21,6 +21,7 @@ struct pen_renderer_config {
     bool require_gpu;          /* fail rather than run in software */
     bool debug;                /* GL debug output to stderr */
     uint64_t gpu_memory_bytes; /* budget for scenes, images and shadow inputs; 0: 1 GiB */
+    uint32_t programs;         /* most compiled programs kept between frames; 0: 256 */
 };
 
 /* Every registered method; usable without a renderer and without a GPU. */
@@ -39,6 +40,7 @@ bool pen_renderer_load_scene(struct pen_renderer *renderer, const uint8_t id[PEN
 bool pen_renderer_has_scene(const struct pen_renderer *renderer, const uint8_t id[PEN_ID_BYTES]);
 void pen_renderer_drop_scene(struct pen_renderer *renderer, const uint8_t id[PEN_ID_BYTES]);
 uint64_t pen_renderer_gpu_bytes(const struct pen_renderer *renderer);
+struct pen_program_counts pen_renderer_programs(const struct pen_renderer *renderer);
 
 /* Emission images are one-image blobs (.pscene with one image and no geometry). */
 bool pen_renderer_load_image(struct pen_renderer *renderer, const uint8_t id[PEN_ID_BYTES],

@@ -1,5 +1,6 @@
-/* Compiled programs, kept by their full source text. */
+/* Compiled programs, kept by what their text is made of. */
 #pragma once
+#include "protocol/result.h"
 #include "protocol/technique_info.h"
 #include "renderer/gl/gl.h"
 
@@ -15,13 +16,26 @@ struct gl_program_desc {
     const void *params; /* the method's struct: values of the rows that specialise */
 };
 
-struct gl_programs *gl_programs_create(void);
+/* Keeps at most so many programs from frame to frame; 0: 256. */
+struct gl_programs *gl_programs_create(uint32_t most);
 void gl_programs_destroy(struct gl_programs *programs);
 
-/* The program, compiled on first use; owned by the cache. 0 and PEN_INTERNAL when it does not
- * compile (the log goes to stderr: clients are not shown sources). */
+/* The program, assembled and compiled on first use; owned by the cache, which keeps it at least
+ * until gl_programs_end_frame. 0 and PEN_INTERNAL when it does not compile (the log goes to stderr:
+ * clients are not shown sources). */
 GLuint gl_programs_get(
     struct gl_programs *programs, const struct gl_program_desc *desc, struct pen_error *error);
+
+/* Nothing holds a name of gl_programs_get any longer. The least recently used programs leave until
+ * the limits hold, but never one that this frame has used: the next one is likely to want it. */
+void gl_programs_end_frame(struct gl_programs *programs);
+struct pen_program_counts gl_programs_counts(const struct gl_programs *programs);
+
+#define LOCATION(name, number) LOCATION_##name = number,
+enum gl_location {
+#include "renderer/gl/locations.def"
+};
+#undef LOCATION
 
 /* Binding points that every program shares. */
 enum gl_ubo { GL_UBO_VIEW = 0, GL_UBO_LIGHT = 1, GL_UBO_PARAMS = 2, GL_UBO_EXTRA = 3 };

@@ -14,7 +14,7 @@ bool compute_begin(struct technique_ctx *ctx, struct gl_context **context)
         fprintf(stderr, "skipped: %s\n", error.message);
         return false;
     }
-    ctx->programs = gl_programs_create();
+    ctx->programs = gl_programs_create(0);
     gl_samplers_init(&ctx->samplers);
     gl_timer_init(&ctx->timer, ctx->device.software);
     gl.CreateVertexArrays(1, &ctx->empty_array);

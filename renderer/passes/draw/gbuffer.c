@@ -29,8 +29,7 @@ static GLuint program(struct technique_ctx *ctx, const char *defines, struct pen
 
 static void set_matrix(GLuint program, const mat4 matrix)
 {
-    gl.ProgramUniformMatrix4fv(
-        program, gl.GetUniformLocation(program, "to_clip"), 1, GL_FALSE, (const float *)matrix);
+    gl.ProgramUniformMatrix4fv(program, LOCATION_TO_CLIP, 1, GL_FALSE, (const float *)matrix);
 }
 
 bool pass_gbuffer(struct technique_ctx *ctx, struct scene *scene, const struct view *view,

@@ -55,7 +55,7 @@ void pass_draw_tiles(struct technique_ctx *ctx, GLuint program, GLuint framebuff
     const struct gl_texture *tiles, int32_t tile_class, uint32_t width, uint32_t height, bool add)
 {
     gl.BindTextureUnit(UNIT_TILES, tiles->name);
-    gl.ProgramUniform2i(program, gl.GetUniformLocation(program, "tile"), CLASSIFY_TILE, tile_class);
+    gl.ProgramUniform2i(program, LOCATION_TILE, CLASSIFY_TILE, tile_class);
     begin(ctx, program, framebuffer, width, height, add);
     /* Whole tiles: a point whose centre is outside the viewport would be lost. */
     gl.Viewport(

@@ -32,13 +32,13 @@ static bool draw(struct technique_run *run, GLuint framebuffer, uint32_t size,
     }
     GLuint programs[] = {pass.opaque, pass.textured};
     for (int i = 0; i < 2; i++)
-        gl.ProgramUniformMatrix4fv(programs[i], gl.GetUniformLocation(programs[i], "to_clip"), 1,
-            GL_FALSE, (const float *)cull.world_to_clip);
+        gl.ProgramUniformMatrix4fv(
+            programs[i], LOCATION_TO_CLIP, 1, GL_FALSE, (const float *)cull.world_to_clip);
     /* Maps that are averaged cut blended surfaces at different thresholds. */
     uint32_t seed;
     float mixed = sample[0] * 7919.0f + sample[1] * 104729.0f;
     memcpy(&seed, &mixed, 4);
-    gl.ProgramUniform1ui(pass.textured, gl.GetUniformLocation(pass.textured, "seed"), seed);
+    gl.ProgramUniform1ui(pass.textured, LOCATION_SEED, seed);
     static const float one[4] = {1};
     gl.BindFramebuffer(GL_FRAMEBUFFER, framebuffer);
     gl.Viewport(0, 0, (GLsizei)size, (GLsizei)size);

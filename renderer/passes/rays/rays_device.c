@@ -181,11 +181,10 @@ static bool pretest(struct work *w, struct pen_error *error)
     GLuint name = program(w, "ray_pretest.comp", error);
     if (!name)
         return false;
-    GLint first_row = gl.GetUniformLocation(name, "first_row");
     bind_image(IMAGE_MARKS, &w->targets->verdicts);
     for (uint32_t y = 0; y < height; y += rows * TILE) {
         uint32_t left = groups(height - y, TILE);
-        gl.ProgramUniform1ui(name, first_row, y);
+        gl.ProgramUniform1ui(name, LOCATION_FIRST_ROW, y);
         dispatch(columns, left < rows ? left : rows);
     }
     if (!program(w, "ray_spread.comp", error))
@@ -217,7 +216,6 @@ static bool select_receivers(struct work *w, struct pen_error *error)
 static void sample_range(const struct work *w, GLuint name, uint32_t first, uint32_t most)
 {
     const struct trace_points *p = &w->points;
-    GLint range = gl.GetUniformLocation(name, "range"), ends = gl.GetUniformLocation(name, "ends");
     uint32_t left = w->listed - first, step = 2, point = 0;
     uint32_t count = left < RECEIVERS_PER_DISPATCH ? left : RECEIVERS_PER_DISPATCH;
     while (step * 2 <= most && step * 2 <= RAYS_PER_DISPATCH / count)
@@ -227,8 +225,11 @@ static void sample_range(const struct work *w, GLuint name, uint32_t first, uint
         for (; point < end; point += step) {
             uint32_t points = end - point < step ? end - point : step;
             bool last = point + points == end;
-            gl.ProgramUniform4ui(name, range, first, count, point, points);
-            gl.ProgramUniform1ui(name, ends, !last ? 0u : b + 1 == p->block_count ? 2u : 1u);
+            gl.ProgramUniform4ui(name, LOCATION_RANGE, first, count, point, points);
+            gl.ProgramUniform1ui(name, LOCATION_ENDS,
+                !last                     ? 0u
+                : b + 1 == p->block_count ? 2u
+                                          : 1u);
             dispatch(groups(count, GROUP), 1);
         }
         point = end;

@@ -2,7 +2,7 @@
 // under the bounds, made of four vertices without any buffer.
 #include "view.glsl"
 
-uniform mat4 to_clip; // world to clip space of the target
+layout(location = LOCATION_TO_CLIP) uniform mat4 to_clip; // world to clip space of the target
 
 layout(location = 0) in vec3 position;
 #if defined(FULL) || defined(ALPHA)

@@ -2,7 +2,7 @@
 layout(local_size_x = 8, local_size_y = 8) in;
 #include "ray_trace.glsl"
 layout(r8ui, binding = 2) writeonly uniform uimage2D verdicts;
-uniform uint first_row;
+layout(location = LOCATION_FIRST_ROW) uniform uint first_row;
 
 void main()
 {

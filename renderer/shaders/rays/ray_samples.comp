@@ -13,8 +13,8 @@ struct RaySums {
 layout(std430, binding = 3) buffer RayState {
     RaySums state[];
 };
-uniform uvec4 range; // first entry of the list, entries, first point, points
-uniform uint ends;   // 1: a receiver may stop after this, 2: it must
+layout(location = LOCATION_RANGE) uniform uvec4 range; // first entry of the list, entries, first point, points
+layout(location = LOCATION_ENDS) uniform uint ends;   // 1: a receiver may stop after this, 2: it must
 
 void finish(ivec2 pixel, inout RaySums sums)
 {

@@ -1,7 +1,7 @@
 // One point as large as a tile per tile of the wanted class; the others are clipped away. A point is
 // one square for the rasteriser, where two triangles would shade the blocks on their seam twice.
 layout(binding = 15) uniform sampler2D tile_classes;
-uniform ivec2 tile; // x: px, y: class to draw
+layout(location = LOCATION_TILE) uniform ivec2 tile; // x: px, y: class to draw
 
 void main()
 {

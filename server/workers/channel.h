@@ -5,7 +5,7 @@
 #include "server/queue/measure.h"
 #include <stddef.h>
 
-#define CHANNEL_VERSION 2u
+#define CHANNEL_VERSION 3u
 #define CHANNEL_WORKER_FD 3 /* the worker's end */
 #define CHANNEL_MAX_FDS (2 + PEN_MAX_LIGHTS)
 
@@ -35,6 +35,7 @@ struct channel_warm {
     float warm_ms;
     uint32_t reserved;
     uint64_t gpu_bytes;
+    struct pen_program_counts programs;
 };
 struct channel_job {
     struct pen_request request;

@@ -39,6 +39,7 @@ static void warm_up(struct worker *worker)
     message.kind = CHANNEL_WARM;
     message.warm.warm_ms = (float)pen_renderer_warm_up(worker->renderer);
     message.warm.gpu_bytes = pen_renderer_gpu_bytes(worker->renderer);
+    message.warm.programs = pen_renderer_programs(worker->renderer);
     worker->warm_up = WORKER_NO_WARM_UP;
     send_or_exit(&message);
 }
@@ -129,6 +130,7 @@ static bool run_job(
     result->scene_was_resident = was_resident;
     result->device = *pen_renderer_device(worker->renderer);
     result->gpu_bytes = pen_renderer_gpu_bytes(worker->renderer);
+    result->programs = pen_renderer_programs(worker->renderer);
     tell_resident(worker, job->request.scene); /* before the answer, so that both agree */
     note.kind = CHANNEL_RENDERED;
     send_or_exit(&note);

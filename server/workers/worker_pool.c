@@ -42,6 +42,7 @@ struct slot {
     uint8_t drops[MAX_DROPS][PEN_ID_BYTES]; /* guarded by pool->lock */
     uint32_t drop_count;                    /* guarded by pool->lock */
     struct channel_resident resident;       /* guarded by pool->lock */
+    struct pen_program_counts programs;     /* guarded by pool->lock */
     /* Only the slot's thread: */
     struct process process;
     int socket;
@@ -54,7 +55,7 @@ struct slot {
 struct worker_pool {
     struct worker_pool_config config;
     struct quarantine *quarantine;
-    pthread_mutex_t lock; /* guards numbers, and the drops and residents of the slots */
+    pthread_mutex_t lock; /* guards numbers, and what says so in the slots */
     struct worker_pool_numbers numbers;
     bool stopping; /* atomic */
     struct slot slots[16];
@@ -201,6 +202,7 @@ static void on_hello(struct slot *slot, const struct channel_hello *hello)
     slot->failures = 0;
     pthread_mutex_lock(&pool->lock);
     struct worker_pool_numbers *numbers = &pool->numbers;
+    slot->programs = (struct pen_program_counts){0};
     numbers->has_device = true;
     numbers->warmed = numbers->warmed || !pool->config.warm_up;
     numbers->device = hello->device;
@@ -237,8 +239,25 @@ static void on_warm(struct slot *slot, const struct channel_warm *warm)
     pool->numbers.warmed = true;
     pool->numbers.warm_ms = warm->warm_ms;
     pool->numbers.gpu_bytes = warm->gpu_bytes;
+    slot->programs = warm->programs;
     pthread_mutex_unlock(&pool->lock);
-    log_event(LOG_INFO, "worker %u warmed up in %.0f ms", slot->index, warm->warm_ms);
+    log_event(LOG_INFO, "worker %u warmed up in %.0f ms: %u programs, about %.0f MiB", slot->index,
+        warm->warm_ms, warm->programs.kept, (double)warm->programs.bytes / (1 << 20));
+}
+
+/* Says in the log when programs begin to leave, and each time as many have left as are kept: then
+ * requests differ in more ways than there is room for, and pay for their compiles. */
+static void take_programs(struct slot *slot, const struct pen_program_counts *now)
+{
+    pthread_mutex_lock(&slot->pool->lock);
+    uint32_t before = slot->programs.evicted;
+    slot->programs = *now;
+    pthread_mutex_unlock(&slot->pool->lock);
+    uint32_t step = now->kept ? now->kept : 1;
+    if ((now->evicted && !before) || now->evicted / step != before / step)
+        log_event(LOG_INFO,
+            "worker %u keeps %u programs, about %.0f MiB; of %u compiled, %u have left",
+            slot->index, now->kept, (double)now->bytes / (1 << 20), now->compiled, now->evicted);
 }
 
 static void on_done(
@@ -256,6 +275,7 @@ static void on_done(
     pthread_mutex_lock(&pool->lock);
     pool->numbers.gpu_bytes = result.gpu_bytes;
     pthread_mutex_unlock(&pool->lock);
+    take_programs(slot, &result.programs);
     outcome.result = &result;
     if (outcome.error.code == PEN_OK && flight->render->measure != MEASURE_PICTURE) {
         measured_take(flight->render->measure, fds, &outcome);
@@ -529,6 +549,13 @@ void worker_pool_read(struct worker_pool *pool, struct worker_pool_numbers *numb
 {
     pthread_mutex_lock(&pool->lock);
     *numbers = pool->numbers;
+    for (uint32_t i = 0; i < pool->config.workers; i++) {
+        const struct pen_program_counts *p = &pool->slots[i].programs;
+        numbers->programs.kept += p->kept;
+        numbers->programs.bytes += p->bytes;
+        numbers->programs.compiled += p->compiled;
+        numbers->programs.evicted += p->evicted;
+    }
     pthread_mutex_unlock(&pool->lock);
     numbers->quarantined = quarantine_count(pool->quarantine);
 }

@@ -42,8 +42,9 @@ struct worker_pool_numbers {
     uint32_t up; /* workers that take jobs now */
     uint32_t restarts, crashes, hangs, retries, quarantined;
     uint64_t gpu_bytes;
-    double create_ms, warm_ms; /* of the last worker that started */
-    double back_ms;            /* from the death of a worker to its successor's hello */
+    struct pen_program_counts programs; /* of all workers, each since its start */
+    double create_ms, warm_ms;          /* of the last worker that started */
+    double back_ms;                     /* from the death of a worker to its successor's hello */
     int pids[16];
     struct pen_error refused; /* the first worker found no device; it is not tried again */
 };

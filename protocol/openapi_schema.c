@@ -54,7 +54,7 @@ static void write_component(struct pen_json *json, const struct pen_param *row)
 
 static void write_row(struct pen_json *json, const struct pen_param *row)
 {
-    char description[512];
+    char description[2048]; /* a layer more is a sentence more */
     pen_json_object(json, row->name);
     if (row->count > 1) {
         pen_json_string(json, "type", "array");

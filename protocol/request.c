@@ -4,8 +4,6 @@
 #include <string.h>
 
 const char *const pen_light_type_names[] = {"rect", "disk", "sphere", "sun", "point", "spot", NULL};
-const char *const pen_layer_names[] = {"beauty", "visibility", "penumbra", "depth", "normal",
-    "albedo", "position", "classes", "error", "all", NULL};
 const char *const pen_format_names[] = {"png", "exr", "jpeg", "webp", "tiff", NULL};
 const char *const pen_format_mime[] = {
     "image/png", "image/x-exr", "image/jpeg", "image/webp", "image/tiff", NULL};
@@ -78,16 +76,16 @@ static const struct pen_param light_rows[] = {
         .applies = PEN_LIGHT_BIT(PEN_LIGHT_SUN), .help = "On a surface that faces the sun."),
 };
 
+static const char layer_help[] = "What the image shows."
+#define LAYER(id, name, channels, unit, source, help) " " #name ": " help
+#include "protocol/layers.def"
+#undef LAYER
+                                 " all: every layer that the method has, in one EXR.";
+
 #define OUTPUT(field, ...) PARAM(struct pen_output, field, __VA_ARGS__)
 static const struct pen_param output_rows[] = {
     OUTPUT(format, .def = PEN_PNG, .choices = pen_format_names, .help = "File format."),
-    OUTPUT(layer, .def = PEN_LAYER_BEAUTY, .choices = pen_layer_names,
-        .help = "What the image shows. penumbra: 0 lit, 1 penumbra, 2 umbra, of the mean "
-                "visibility. classes: what the classifier proved before any shadow was computed: "
-                "0 lit in every light, 1 undecided, 2 in the umbra of every light. error: standard "
-                "error of the mean visibility, 0 where the method has no estimate. Files of "
-                "integers show classes in halves of the range, and an error of 0.1 or more as "
-                "white. all: every layer that the method has, in one EXR."),
+    OUTPUT(layer, .def = PEN_LAYER_BEAUTY, .choices = pen_layer_names, .help = layer_help),
     OUTPUT(bit_depth, .def = 0, .min = 0, .max = 32, .unit = "bit",
         .help = "8 or 16 for PNG and TIFF, 16 or 32 for EXR; 0: 8, or 16 for EXR."),
     OUTPUT(quality, .def = 92, .min = 1, .max = 100, .help = "JPEG and WebP quality."),

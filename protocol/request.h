@@ -2,6 +2,7 @@
  * it is, its bytes up to `delivery` are the cache key, and it is echoed back completed. */
 #pragma once
 #include "protocol/limits.h"
+#include "protocol/layer.h"
 #include "protocol/param.h"
 
 enum pen_light_type {
@@ -52,19 +53,6 @@ struct pen_camera {
     float distance; /* m; 0: frames the bounds */
 };
 
-enum pen_layer {
-    PEN_LAYER_BEAUTY,
-    PEN_LAYER_VISIBILITY, /* mean over lights: rgb = coloured visibility, a = mean visibility */
-    PEN_LAYER_PENUMBRA,   /* of the mean visibility: 0 lit, 1 penumbra, 2 umbra */
-    PEN_LAYER_DEPTH,      /* distance along the view axis, m */
-    PEN_LAYER_NORMAL,     /* world-space shading normal */
-    PEN_LAYER_ALBEDO,
-    PEN_LAYER_POSITION, /* world, m */
-    PEN_LAYER_CLASSES,  /* proved before: 0 lit in every light, 1 undecided, 2 umbra in every one */
-    PEN_LAYER_ERROR,    /* standard error of the mean visibility, where a method estimates it */
-    PEN_LAYER_ALL,      /* EXR only: all that the method has of the above, in one file */
-    PEN_LAYERS
-};
 enum pen_format { PEN_PNG, PEN_EXR, PEN_JPEG, PEN_WEBP, PEN_TIFF, PEN_FORMATS };
 enum pen_tone_map { PEN_TONE_NONE, PEN_TONE_REINHARD, PEN_TONE_ACES, PEN_TONE_MAPS };
 enum pen_weighting { PEN_WEIGHT_AREA, PEN_WEIGHT_G };
@@ -99,7 +87,6 @@ struct pen_request {
 #define PEN_REQUEST_KEY_BYTES offsetof(struct pen_request, delivery)
 
 extern const char *const pen_light_type_names[];
-extern const char *const pen_layer_names[];
 extern const char *const pen_format_names[];
 extern const char *const pen_format_mime[];
 extern const char *const pen_tone_map_names[];

@@ -20,15 +20,6 @@ static uint32_t bits_of(const struct pen_output *output)
     return output->format == PEN_EXR ? 16 : 8;
 }
 
-enum pen_pixel pen_encode_wants(const struct pen_output *output)
-{
-    bool metres = output->layer == PEN_LAYER_DEPTH || output->layer == PEN_LAYER_POSITION;
-    if (output->format == PEN_EXR)
-        return bits_of(output) == 32 || (output->bit_depth == 0 && metres) ? PEN_PIXEL_RGBA32F
-                                                                           : PEN_PIXEL_RGBA16F;
-    return bits_of(output) == 16 ? PEN_PIXEL_RGBA32F : PEN_PIXEL_RGBA8;
-}
-
 struct source {
     const struct pen_frame *frame;
     uint32_t plane_count;
@@ -57,18 +48,20 @@ static void fill_rows(void *user, uint32_t first, uint32_t count, void *out)
     }
 }
 
-static bool is_vector(const char *plane)
+static const char *letters_of(const struct pen_plane *plane, uint32_t channels, bool several)
 {
-    return !strcmp(plane, "normal") || !strcmp(plane, "position");
+    const struct pen_layer_info *layer = pen_layer_find(plane->name);
+    uint32_t kind = layer ? layer->channels : PEN_CHANNELS_RGBA;
+    if (channels == 1)
+        return kind == PEN_CHANNELS_Z ? "Z" : "Y";
+    return several && kind == PEN_CHANNELS_XYZ ? "XYZW" : "RGBA";
 }
 
 static void name_channels(
     const struct pen_plane *plane, uint32_t channels, bool several, char (*names)[32])
 {
-    const char *letters = channels == 1 ? (!strcmp(plane->name, "depth") ? "Z" : "Y")
-                          : several && is_vector(plane->name) ? "XYZW"
-                                                              : "RGBA";
-    bool prefix = several && strcmp(plane->name, "beauty") != 0;
+    const char *letters = letters_of(plane, channels, several);
+    bool prefix = several && strcmp(plane->name, pen_layers[PEN_LAYER_BEAUTY].name) != 0;
     for (uint32_t c = 0; c < channels; c++)
         snprintf(names[c], sizeof names[c], "%.*s%s%c", (int)sizeof plane->name,
             prefix ? plane->name : "", prefix ? "." : "", letters[c]);

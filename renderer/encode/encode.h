@@ -35,8 +35,3 @@ void pen_bytes_finish(struct pen_bytes *bytes);
 bool pen_encode(const struct pen_frame *frame, const struct pen_output *output,
     const char *const *attributes, uint32_t attribute_count, struct pen_bytes *bytes,
     struct pen_error *error);
-
-/* The pixel type the renderer should deliver for this output. With layer PEN_LAYER_ALL ask once per
- * plane, with `layer` set to the plane's: at the default bit depth of EXR, depth and position want
- * RGBA32F, because a half is too coarse for metres. */
-enum pen_pixel pen_encode_wants(const struct pen_output *output);

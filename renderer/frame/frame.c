@@ -87,9 +87,9 @@ static void fit_targets(struct frame *f)
             gl.NamedFramebufferTextureLayer(
                 t->vis_framebuffers[i], GL_COLOR_ATTACHMENT0, t->vis.name, 0, (GLint)i);
     }
-    if (!frame_output_is_direct(r) && frame_output_needs_beauty(r))
+    if (!frame_output_is_direct(r) && frame_output_needs(r, PEN_SOURCE_BEAUTY))
         fit_sum(&t->beauty_sum, &t->beauty_framebuffer, r->width, r->height);
-    if (frame_output_needs_visibility(r))
+    if (frame_output_needs(r, PEN_SOURCE_VISIBILITY))
         fit_sum(&t->vis_sum, &t->vis_sum_framebuffer, r->width, r->height);
 }
 
@@ -317,7 +317,8 @@ static bool add_visibility(struct frame *f, struct pen_error *error)
 static bool render_jittered(struct frame *f, uint32_t number, struct pen_error *error)
 {
     const struct pen_request *r = f->job->request;
-    bool beauty = frame_output_needs_beauty(r), visibility = frame_output_needs_visibility(r);
+    bool beauty = frame_output_needs(r, PEN_SOURCE_BEAUTY),
+         visibility = frame_output_needs(r, PEN_SOURCE_VISIBILITY);
     f->number = number;
     upload_view(f, number);
     return pass_gbuffer(f->job->ctx, f->job->scene, &f->view, r->ground.on,

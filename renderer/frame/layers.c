@@ -1,15 +1,15 @@
 #include "renderer/frame/layers.h"
+#include "renderer/frame/output.h"
 #include "renderer/passes/map/classify.h"
 
 bool frame_layers_want_classes(const struct pen_request *r)
 {
-    return r->output.layer == PEN_LAYER_CLASSES || r->output.layer == PEN_LAYER_ALL;
+    return frame_output_needs(r, PEN_SOURCE_CLASSES);
 }
 
 bool frame_layers_want_error(const struct pen_request *r, const struct technique *technique)
 {
-    return technique->estimates_error &&
-           (r->output.layer == PEN_LAYER_ERROR || r->output.layer == PEN_LAYER_ALL);
+    return technique->estimates_error && frame_output_needs(r, PEN_SOURCE_VARIANCE);
 }
 
 static void fit(struct frame_layer *layer, GLenum format, const struct pen_request *r)
@@ -31,9 +31,10 @@ void frame_layers_begin(const struct frame_job *job, struct pen_result *result)
     if (frame_layers_want_classes(r))
         fit(&job->targets->classes, GL_RG16F, r);
     bool estimated = frame_layers_want_error(r, job->technique);
-    if (estimated || r->output.layer == PEN_LAYER_ERROR)
+    bool alone = r->output.layer != PEN_LAYER_ALL && frame_output_needs(r, PEN_SOURCE_VARIANCE);
+    if (estimated || alone)
         fit(&job->targets->variance, GL_R32F, r);
-    if (!estimated && r->output.layer == PEN_LAYER_ERROR)
+    if (!estimated && alone)
         pen_result_warn(result, "%s does not estimate its error: the layer is 0.", title);
 }
 
@@ -101,7 +102,7 @@ void frame_layers_end(const struct frame_job *job, const struct frame_work *work
         gl.GetQueryObjectui64v(work->queries[i], GL_QUERY_RESULT, &receivers);
         result->full_work_pixels += work->lights[i] * (uint32_t)receivers;
     }
-    if (r->output.layer != PEN_LAYER_CLASSES || classified)
+    if (r->output.layer == PEN_LAYER_ALL || !frame_layers_want_classes(r) || classified)
         return;
     if (r->classify.on)
         pen_result_warn(result, "%s does not use the classifier here: all is undecided.",

@@ -7,30 +7,24 @@
 #include <stdlib.h>
 #include <string.h>
 
-bool frame_output_needs_beauty(const struct pen_request *r)
+bool frame_output_needs(const struct pen_request *r, enum pen_layer_source source)
 {
-    return r->output.layer == PEN_LAYER_BEAUTY || r->output.layer == PEN_LAYER_ALL;
-}
-
-bool frame_output_needs_visibility(const struct pen_request *r)
-{
-    return r->output.layer == PEN_LAYER_VISIBILITY || r->output.layer == PEN_LAYER_PENUMBRA ||
-           r->output.layer == PEN_LAYER_ALL;
+    return r->output.layer == PEN_LAYER_ALL || pen_layers[r->output.layer].source == source;
 }
 
 bool frame_output_needs_shadows(const struct pen_request *r)
 {
-    return frame_output_needs_beauty(r) || frame_output_needs_visibility(r) ||
-           r->output.layer == PEN_LAYER_CLASSES || r->output.layer == PEN_LAYER_ERROR;
+    return r->output.layer == PEN_LAYER_ALL ||
+           pen_layers[r->output.layer].source != PEN_SOURCE_GBUFFER;
 }
 
 static enum pen_pixel pixel_of(const struct pen_output *output, uint32_t layer)
 {
-    /* Half floats would cut depth and position to three digits. */
-    bool metres = layer == PEN_LAYER_DEPTH || layer == PEN_LAYER_POSITION;
+    /* Half floats would cut metres to three digits. */
+    bool wide =
+        output->bit_depth == 32 || (!output->bit_depth && pen_layer_is_metres(&pen_layers[layer]));
     if (output->format == PEN_EXR)
-        return output->bit_depth == 32 || (metres && !output->bit_depth) ? PEN_PIXEL_RGBA32F
-                                                                         : PEN_PIXEL_RGBA16F;
+        return wide ? PEN_PIXEL_RGBA32F : PEN_PIXEL_RGBA16F;
     return output->bit_depth == 16 ? PEN_PIXEL_RGBA32F : PEN_PIXEL_RGBA8;
 }
 
@@ -80,26 +74,42 @@ static void make_block(const struct frame_job *job, const struct view *view, str
         distance + radius > b->bounds_min[3] ? distance + radius : b->bounds_min[3] + radius;
 }
 
+static const struct gl_texture *source_of(const struct frame_targets *t, uint32_t layer)
+{
+    static const struct gl_texture none;
+    switch (pen_layers[layer].source) {
+    case PEN_SOURCE_BEAUTY:
+        return &t->beauty_sum;
+    case PEN_SOURCE_VISIBILITY:
+        return &t->vis_sum;
+    case PEN_SOURCE_CLASSES:
+        return &t->classes.sum;
+    case PEN_SOURCE_VARIANCE:
+        return &t->variance.sum;
+    default:
+        return &none;
+    }
+}
+
 static bool convert(const struct frame_job *job, const struct output_block *block, uint32_t layer,
     bool raw, struct pen_error *error)
 {
     struct frame_targets *t = job->targets;
     char defines[64];
-    snprintf(defines, sizeof defines, "#define LAYER %u\n%s", layer, raw ? "#define RAW\n" : "");
-    const struct gl_texture *accumulated = layer == PEN_LAYER_BEAUTY    ? &t->beauty_sum
-                                           : layer == PEN_LAYER_CLASSES ? &t->classes.sum
-                                           : layer == PEN_LAYER_ERROR   ? &t->variance.sum
-                                                                        : &t->vis_sum;
-    struct pass_texture textures[] = {{0, t->gbuffer.depth.name, GL_SAMPLE_NEAREST},
-        {1, t->gbuffer.normal.name, GL_SAMPLE_NEAREST},
-        {2, t->gbuffer.albedo.name, GL_SAMPLE_NEAREST}, {7, accumulated->name, GL_SAMPLE_NEAREST}};
+    snprintf(defines, sizeof defines, "#define LAYER layer_%s\n%s", pen_layers[layer].name,
+        raw ? "#define RAW true\n" : "#define RAW false\n");
+    struct pass_texture textures[] = {{UNIT_DEPTH, t->gbuffer.depth.name, GL_SAMPLE_NEAREST},
+        {UNIT_NORMAL, t->gbuffer.normal.name, GL_SAMPLE_NEAREST},
+        {UNIT_ALBEDO, t->gbuffer.albedo.name, GL_SAMPLE_NEAREST},
+        {UNIT_SURFACE, t->gbuffer.surface.name, GL_SAMPLE_NEAREST},
+        {UNIT_FREE, source_of(t, layer)->name, GL_SAMPLE_NEAREST}};
     return pass_fill(job->ctx,
         &(struct pass_fill){.name = "output",
             .fragment = "output.frag",
             .defines = defines,
             .stage = PEN_STAGE_SHADE,
             .textures = textures,
-            .texture_count = 4,
+            .texture_count = sizeof textures / sizeof *textures,
             .framebuffer = t->color_framebuffer,
             .width = job->request->width,
             .height = job->request->height,
@@ -110,13 +120,11 @@ static bool convert(const struct frame_job *job, const struct output_block *bloc
 
 static uint32_t channels_of(uint32_t layer, enum pen_pixel pixel)
 {
-    switch (layer) {
-    case PEN_LAYER_DEPTH:
-    case PEN_LAYER_PENUMBRA:
-    case PEN_LAYER_CLASSES:
-    case PEN_LAYER_ERROR:
+    switch (pen_layers[layer].channels) {
+    case PEN_CHANNELS_Y:
+    case PEN_CHANNELS_Z:
         return 1;
-    case PEN_LAYER_VISIBILITY:
+    case PEN_CHANNELS_RGBA:
         return pixel == PEN_PIXEL_RGBA8 ? 3 : 4;
     default:
         return 3;
@@ -127,7 +135,7 @@ static void read_plane(
     const struct frame_job *job, enum pen_pixel pixel, uint32_t layer, struct pen_frame *frame)
 {
     struct pen_plane *plane = &frame->planes[frame->plane_count++];
-    snprintf(plane->name, sizeof plane->name, "%s", pen_layer_names[layer]);
+    snprintf(plane->name, sizeof plane->name, "%s", pen_layers[layer].name);
     plane->pixel = pixel;
     plane->channels = channels_of(layer, pixel);
     plane->data = pen_alloc((size_t)frame->width * frame->height * pixel_bytes[pixel], 1);
@@ -149,7 +157,8 @@ bool frame_output_read(const struct frame_job *job, const struct view *view,
     frame->width = r->width, frame->height = r->height;
     make_block(job, view, &block);
     for (uint32_t layer = 0; layer < PEN_LAYER_ALL; layer++) {
-        bool has = layer != PEN_LAYER_ERROR || frame_layers_want_error(r, job->technique);
+        bool has = pen_layers[layer].source != PEN_SOURCE_VARIANCE ||
+                   frame_layers_want_error(r, job->technique);
         if (r->output.layer == PEN_LAYER_ALL ? !has : r->output.layer != layer)
             continue;
         enum pen_pixel pixel = pixel_of(&r->output, layer);

@@ -2,9 +2,8 @@
 #pragma once
 #include "renderer/frame/frame.h"
 
-/* What the output needs to have been accumulated. */
-bool frame_output_needs_beauty(const struct pen_request *request);
-bool frame_output_needs_visibility(const struct pen_request *request);
+/* A layer of the output is made of that. */
+bool frame_output_needs(const struct pen_request *request, enum pen_layer_source source);
 /* True when the method has to run at all. */
 bool frame_output_needs_shadows(const struct pen_request *request);
 /* True when one 8-bit beauty image of one frame is all that is wanted: shading then resolves. */

@@ -111,22 +111,6 @@ static void refusals(void)
     pattern_finish(&frame);
 }
 
-static void wants(void)
-{
-    struct pen_output output = {.format = PEN_PNG};
-    CHECK(pen_encode_wants(&output) == PEN_PIXEL_RGBA8);
-    output.bit_depth = 16;
-    CHECK(pen_encode_wants(&output) == PEN_PIXEL_RGBA32F);
-    output = (struct pen_output){.format = PEN_EXR};
-    CHECK(pen_encode_wants(&output) == PEN_PIXEL_RGBA16F);
-    output.layer = PEN_LAYER_DEPTH;
-    CHECK(pen_encode_wants(&output) == PEN_PIXEL_RGBA32F);
-    output.bit_depth = 16;
-    CHECK(pen_encode_wants(&output) == PEN_PIXEL_RGBA16F);
-    output = (struct pen_output){.format = PEN_EXR, .bit_depth = 32};
-    CHECK(pen_encode_wants(&output) == PEN_PIXEL_RGBA32F);
-}
-
 #define THREADS 4
 static struct pen_bytes results[THREADS][PEN_FORMATS];
 
@@ -195,6 +179,5 @@ int main(void)
         webp(8191, 3, 3, quality);
     }
     refusals();
-    wants();
     CHECK_DONE();
 }

@@ -328,28 +328,21 @@ static void drain(struct service *s, const bool *hurry)
 
 void service_destroy(struct service *s, const bool *hurry)
 {
+    if (!s)
+        return;
     drain(s, hurry);
-    if (s->importer)
-        importer_destroy(s->importer);
+    importer_destroy(s->importer);
     if (s->admin)
         http_listener_drain(s->admin);
     if (s->scheduler)
         scheduler_cancel(s->scheduler);
-    if (s->listener)
-        http_listener_destroy(s->listener);
-    if (s->admin)
-        http_listener_destroy(s->admin);
-    struct worker_pool *pool = s->pool;
-    if (pool)
-        worker_pool_destroy(pool);
-    if (s->scheduler)
-        scheduler_destroy(s->scheduler);
-    if (s->cache)
-        result_cache_destroy(s->cache);
-    if (s->metrics)
-        metrics_destroy(s->metrics);
-    if (s->store)
-        scene_store_close(s->store);
+    http_listener_destroy(s->listener);
+    http_listener_destroy(s->admin);
+    worker_pool_destroy(s->pool);
+    scheduler_destroy(s->scheduler);
+    result_cache_destroy(s->cache);
+    metrics_destroy(s->metrics);
+    scene_store_close(s->store);
     if (s->canary_blob >= 0)
         close(s->canary_blob);
     auto_runs_destroy(s->auto_runs);

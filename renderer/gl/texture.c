@@ -58,6 +58,8 @@ struct gl_texture gl_texture_create(
 
 void gl_texture_destroy(struct gl_texture *texture)
 {
+    if (!texture)
+        return;
     if (texture->name)
         gl.DeleteTextures(1, &texture->name);
     memset(texture, 0, sizeof *texture);

@@ -59,6 +59,8 @@ struct metrics *metrics_create(const struct pen_catalogue *catalogue)
 
 void metrics_destroy(struct metrics *m)
 {
+    if (!m)
+        return;
     pthread_mutex_destroy(&m->lock);
     free(m);
 }

@@ -417,6 +417,8 @@ void door_close_idle(struct door *door)
 
 void door_destroy(struct door *door)
 {
+    if (!door)
+        return;
     pthread_mutex_lock(&door->lock);
     door->stopping = true;
     pthread_mutex_unlock(&door->lock);

@@ -444,6 +444,8 @@ void http_listener_drain(struct http_listener *listener)
 
 void http_listener_destroy(struct http_listener *listener)
 {
+    if (!listener)
+        return;
     door_close_idle(listener->door);
     MHD_stop_daemon(listener->daemon);
     door_destroy(listener->door);

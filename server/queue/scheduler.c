@@ -46,6 +46,8 @@ struct scheduler *scheduler_create(
 
 void scheduler_destroy(struct scheduler *s)
 {
+    if (!s)
+        return;
     pthread_mutex_destroy(&s->lock);
     free(s->shares);
     free(s);

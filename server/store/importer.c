@@ -266,6 +266,8 @@ void importer_cancel(struct importer *importer)
 
 void importer_destroy(struct importer *importer)
 {
+    if (!importer)
+        return;
     importer_cancel(importer);
     pthread_mutex_lock(&importer->lock);
     importer->stopping = true;

@@ -131,6 +131,8 @@ bool result_cache_put(struct result_cache *cache, struct picture *picture)
 
 void result_cache_destroy(struct result_cache *cache)
 {
+    if (!cache)
+        return;
     for (int b = 0; b < BUCKETS; b++)
         free_chain(cache->buckets[b]);
     pthread_mutex_destroy(&cache->lock);

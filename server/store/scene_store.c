@@ -192,6 +192,8 @@ fail:
 
 void scene_store_close(struct scene_store *store)
 {
+    if (!store)
+        return;
     const int fds[] = {store->root, store->tmp, store->lock_file, store->kinds[0], store->kinds[1]};
     for (size_t i = 0; i < sizeof fds / sizeof *fds; i++)
         if (fds[i] >= 0)

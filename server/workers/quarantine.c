@@ -30,6 +30,8 @@ struct quarantine *quarantine_create(uint64_t seconds)
 
 void quarantine_destroy(struct quarantine *q)
 {
+    if (!q)
+        return;
     pthread_mutex_destroy(&q->lock);
     free(q);
 }

@@ -140,6 +140,8 @@ void worker_encoder_submit(struct worker_encoder *encoder, struct worker_item *i
 
 void worker_encoder_destroy(struct worker_encoder *encoder)
 {
+    if (!encoder)
+        return;
     pthread_mutex_lock(&encoder->lock);
     encoder->stopping = true;
     pthread_cond_broadcast(&encoder->work);

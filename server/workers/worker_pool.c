@@ -506,6 +506,8 @@ void worker_pool_wake(struct worker_pool *pool)
 
 void worker_pool_destroy(struct worker_pool *pool)
 {
+    if (!pool)
+        return;
     __atomic_store_n(&pool->stopping, true, __ATOMIC_RELEASE);
     worker_pool_wake(pool);
     for (uint32_t i = 0; i < pool->config.workers; i++) {

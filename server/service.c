@@ -5,6 +5,7 @@
 #include "renderer/blob/builder.h"
 #include "server/auto/choice.h"
 #include "server/base/clock.h"
+#include "server/base/file.h"
 #include "server/base/hash.h"
 #include "server/base/log.h"
 #include "server/base/process.h"
@@ -113,17 +114,17 @@ static bool name_build(const char *worker_path, struct pen_error *error)
     return true;
 }
 
+#define MAX_PEM_BYTES (1 << 18)
+
 static char *read_file(const char *path, struct pen_error *error)
 {
-    char *text = pen_alloc_zero(1, 1 << 18);
-    FILE *file = fopen(path, "re");
-    if (!file || !fread(text, 1, (1 << 18) - 1, file)) {
+    size_t bytes;
+    int fd = open(path, O_RDONLY | O_CLOEXEC);
+    char *text = fd >= 0 ? file_read(fd, MAX_PEM_BYTES, &bytes) : NULL;
+    if (!text)
         pen_fail(error, PEN_UNAVAILABLE, "", "%.200s cannot be read.", path);
-        free(text);
-        text = NULL;
-    }
-    if (file)
-        fclose(file);
+    if (fd >= 0)
+        close(fd);
     return text;
 }
 

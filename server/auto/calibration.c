@@ -1,4 +1,5 @@
 #include "server/auto/calibration.h"
+#include "server/base/file.h"
 #include "protocol/json_writer.h"
 #include "protocol/memory.h"
 #include "server/base/hash.h"
@@ -8,7 +9,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #define MAX_FILE_BYTES (1 << 20)
@@ -111,19 +111,15 @@ static int open_folder(struct scene_store *store, const uint8_t scene[PEN_ID_BYT
 static void read_all(int folder, const struct pen_device_info *device, struct calibration *all)
 {
     char name[48], own[PEN_ID_HEX + 1];
-    struct stat status;
     memset(all, 0, sizeof *all);
     file_name(device, name);
     name_device(device, own);
     int fd = openat(folder, name, O_RDONLY | O_CLOEXEC | O_NOFOLLOW);
     if (fd < 0)
         return;
-    bool fits = !fstat(fd, &status) && status.st_size > 0 && status.st_size <= MAX_FILE_BYTES;
-    size_t bytes = fits ? (size_t)status.st_size : 0;
-    char *content = malloc(bytes + 1);
-    cJSON *root = content && bytes && read(fd, content, bytes) == (ssize_t)bytes
-                      ? cJSON_ParseWithLength(content, bytes)
-                      : NULL;
+    size_t bytes;
+    char *content = file_read(fd, MAX_FILE_BYTES, &bytes);
+    cJSON *root = content ? cJSON_ParseWithLength(content, bytes) : NULL;
     const cJSON *tables = cJSON_GetObjectItemCaseSensitive(root, "tables");
     bool ours = !strcmp(text(root, "measured_by"), own);
     for (const cJSON *at = ours && tables ? tables->child : NULL;

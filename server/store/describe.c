@@ -2,11 +2,11 @@
 #include "protocol/json_result.h"
 #include "protocol/memory.h"
 #include "renderer/blob/pscene.h"
+#include "server/base/file.h"
 #include <cjson/cJSON.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 #include <time.h>
 #include <unistd.h>
 
@@ -101,17 +101,12 @@ char *describe_blob(enum store_kind kind, const uint8_t id[PEN_ID_BYTES], int bl
 char *describe_stored(struct scene_store *store, enum store_kind kind,
     const uint8_t id[PEN_ID_BYTES], bool resident, struct pen_error *error)
 {
-    struct stat status;
-    cJSON *root = NULL;
+    size_t bytes;
     int fd = scene_store_open_meta(store, kind, id, error);
     if (fd < 0)
         return NULL;
-    size_t bytes = !fstat(fd, &status) && status.st_size > 0 && status.st_size <= MAX_META
-                       ? (size_t)status.st_size
-                       : 0;
-    char *text = pen_alloc(bytes + 1, 1);
-    if (bytes && read(fd, text, bytes) == (ssize_t)bytes)
-        root = cJSON_ParseWithLength(text, bytes);
+    char *text = file_read(fd, MAX_META, &bytes);
+    cJSON *root = text ? cJSON_ParseWithLength(text, bytes) : NULL;
     close(fd);
     free(text);
     if (!cJSON_IsObject(root)) {

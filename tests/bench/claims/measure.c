@@ -243,6 +243,14 @@ static void write_light(struct pen_json *json, const struct pen_light *light)
     pen_json_end(json);
 }
 
+static void print_line(struct pen_json *json)
+{
+    char *text = pen_json_finish(json, NULL);
+    puts(text);
+    fflush(stdout);
+    free(text);
+}
+
 static void write_group(struct plan_group *group, const struct picture *pictures,
     struct timing *moving, struct timing *kept)
 {
@@ -272,10 +280,7 @@ static void write_group(struct plan_group *group, const struct picture *pictures
         compare_write(&json, group, pictures, group->pairs[p][0], group->pairs[p][1], flip);
     pen_json_end(&json);
     pen_json_end(&json);
-    char *text = pen_json_finish(&json, NULL);
-    puts(text);
-    fflush(stdout);
-    free(text);
+    print_line(&json);
 }
 
 static void run_group(struct plan_group *group)
@@ -327,10 +332,7 @@ static void write_device(void)
     }
     pen_json_end(&json);
     pen_json_end(&json);
-    char *text = pen_json_finish(&json, NULL);
-    puts(text);
-    fflush(stdout);
-    free(text);
+    print_line(&json);
 }
 
 int main(int argc, char **argv)

@@ -77,9 +77,7 @@ struct pen_renderer *pen_renderer_create(
     gl.TextureSubImage2D(r->ctx.white.name, 0, 0, 0, 1, 1, GL_RGBA, GL_UNSIGNED_BYTE, white);
     for (uint32_t i = 0; i < TECHNIQUE_COUNT; i++) {
         const struct technique *t = technique_registry[i];
-        r->states[i] = calloc(1, t->state_size + 1);
-        if (!r->states[i])
-            abort();
+        r->states[i] = pen_alloc_zero(1, t->state_size);
         if (t->create && !t->create(&r->ctx, r->states[i], error)) {
             pen_renderer_destroy(r);
             return NULL;

@@ -1,3 +1,4 @@
+#include "protocol/memory.h"
 #include "renderer/passes/light/cascades.h"
 #include "renderer/passes/map/classify.h"
 #include "renderer/passes/light/sample_maps.h"
@@ -106,8 +107,7 @@ static bool read_tiles(
         gl.DeleteFramebuffers(1, &state->framebuffer);
         state->framebuffer = gl_framebuffer_create(&color, 1, NULL);
         free(state->depth);
-        if (!(state->depth = malloc(bytes)))
-            abort();
+        state->depth = pen_alloc(bytes, 1);
     }
     int32_t block[4] = {TILE};
     struct pass_texture depth = {UNIT_DEPTH, run->gbuffer->depth.name, GL_SAMPLE_NEAREST};

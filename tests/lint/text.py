@@ -1,5 +1,5 @@
-"""Things no file of ours holds: tabs, trailing blanks, paths of one machine, notes to self; and how
-long a file of code may be."""
+"""Things no file of ours holds: tabs, trailing blanks, paths of one machine, notes to self, memory
+that is asked for without protocol/memory.h and must be there; and how long a file of code may be."""
 import re
 
 import tree
@@ -7,6 +7,8 @@ import tree
 MAX_LINES = 600
 UNFINISHED = re.compile(r"\b(%s)\b" % "|".join(("TO" + "DO", "FIX" + "ME", "X" + "XX", "HA" + "CK")))
 MACHINE_PATH = re.compile(r"(?<![\w.$}:>])/(work|home|root|Users)/\w")
+ALLOCATION = re.compile(r"\b(?:m|c|re)alloc\([^;]*;\s*if \(![^;{}]*\)\s*abort\(\)|"
+                        r"if \(!\([^;]*\b(?:m|c|re)alloc\([^;]*\)\s*abort\(\)")
 TABS_ALLOWED = ("Makefile", ".mk", ".tsv")
 GENERATED = ("package-lock.json",)
 
@@ -24,6 +26,10 @@ def main():
             problems.append("%s: carriage returns" % name)
         if name.endswith(tree.CODE) and len(lines) - 1 > MAX_LINES:
             problems.append("%s: %d lines, more than %d" % (name, len(lines) - 1, MAX_LINES))
+        found = name.endswith((".c", ".h")) and not name.startswith(("protocol/memory", "tests/"))
+        for asked in ALLOCATION.finditer(text) if found else ():
+            problems.append("%s:%d: memory that must be there: pen_alloc (protocol/memory.h)" % (
+                name, text.count("\n", 0, asked.start()) + 1))
         for number, line in enumerate(lines, 1):
             if "\t" in line and not name.endswith(TABS_ALLOWED):
                 problems.append("%s:%d: tab" % (name, number))

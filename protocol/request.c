@@ -3,11 +3,19 @@
 #include <math.h>
 #include <string.h>
 
-const char *const pen_light_type_names[] = {"rect", "disk", "sphere", "sun", "point", "spot", NULL};
+const char *const pen_light_type_names[] = {
+#define PEN_LIGHT_TYPE(name, text) text,
+#include "protocol/light_types.def"
+#undef PEN_LIGHT_TYPE
+    NULL};
 const char *const pen_format_names[] = {"png", "exr", "jpeg", "webp", "tiff", NULL};
 const char *const pen_format_mime[] = {
     "image/png", "image/x-exr", "image/jpeg", "image/webp", "image/tiff", NULL};
-const char *const pen_tone_map_names[] = {"none", "reinhard", "aces", NULL};
+const char *const pen_tone_map_names[] = {
+#define PEN_TONE_MAP(name, text) text,
+#include "protocol/tone_maps.def"
+#undef PEN_TONE_MAP
+    NULL};
 const char *const pen_priority_names[] = {"interactive", "batch", NULL};
 const char *const pen_pattern_names[] = {
     "two-colour", "checker", "stained-glass", "star", "candle-flame", NULL};

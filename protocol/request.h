@@ -6,12 +6,9 @@
 #include "protocol/param.h"
 
 enum pen_light_type {
-    PEN_LIGHT_RECT,   /* one-sided rectangle, emits along position -> target */
-    PEN_LIGHT_DISK,   /* one-sided disk */
-    PEN_LIGHT_SPHERE, /* treated as a disk that faces the receivers */
-    PEN_LIGHT_SUN,    /* parallel light of an angular diameter; direction is position -> target */
-    PEN_LIGHT_POINT,
-    PEN_LIGHT_SPOT,
+#define PEN_LIGHT_TYPE(name, text) PEN_LIGHT_##name,
+#include "protocol/light_types.def"
+#undef PEN_LIGHT_TYPE
     PEN_LIGHT_TYPES
 };
 #define PEN_LIGHT_BIT(t) (1u << (t))
@@ -54,7 +51,12 @@ struct pen_camera {
 };
 
 enum pen_format { PEN_PNG, PEN_EXR, PEN_JPEG, PEN_WEBP, PEN_TIFF, PEN_FORMATS };
-enum pen_tone_map { PEN_TONE_NONE, PEN_TONE_REINHARD, PEN_TONE_ACES, PEN_TONE_MAPS };
+enum pen_tone_map {
+#define PEN_TONE_MAP(name, text) PEN_TONE_##name,
+#include "protocol/tone_maps.def"
+#undef PEN_TONE_MAP
+    PEN_TONE_MAPS
+};
 enum pen_weighting { PEN_WEIGHT_AREA, PEN_WEIGHT_G };
 enum pen_priority { PEN_PRIORITY_INTERACTIVE, PEN_PRIORITY_BATCH };
 

@@ -23,7 +23,7 @@ struct technique_ctx {
     struct shadow_cache *shadows;
     struct pen_device_info device;
     GLuint empty_array;              /* vertex array for passes that make their own vertices */
-    GLuint light_block, param_block; /* uniform buffers, GL_UBO_LIGHT and GL_UBO_PARAMS */
+    GLuint light_block, param_block; /* uniform buffers, UBO_LIGHT and UBO_PARAMS */
     struct gl_texture white;         /* 1 x 1, bound where a light has no emission texture */
     struct gl_texture tiles;         /* of passes/map/classify.c */
     GLuint tiles_framebuffer;
@@ -57,7 +57,7 @@ struct technique_run {
     const struct light_face *face;
     const struct pen_request *request;
     const struct technique *technique;
-    const void *params;     /* the method's own struct, also bound as GL_UBO_PARAMS */
+    const void *params;     /* the method's own struct, also bound as UBO_PARAMS */
     void *state;            /* state_size bytes, zeroed when the renderer starts */
     GLuint vis_framebuffer; /* bound; pixels already 1; only this face's receivers may be written */
     const struct gl_texture *emission; /* of the light, with mips, or ctx->white */
@@ -88,17 +88,3 @@ struct technique {
 };
 
 extern const struct technique *const technique_registry[]; /* NULL-terminated */
-
-/* Texture units of screen passes. */
-enum {
-    UNIT_DEPTH,  /* gbuffer.depth */
-    UNIT_NORMAL, /* gbuffer.normal */
-    UNIT_ALBEDO,
-    UNIT_SURFACE,
-    UNIT_EMITTED,      /* gbuffer.emission */
-    UNIT_EMISSION,     /* emission texture of the light */
-    UNIT_SHADOW,       /* the method's depth map, nearest, border 1 */
-    UNIT_FREE,         /* first of seven units that are the method's own */
-    UNIT_MIN_MAX = 14, /* what min_max.glsl reads */
-    UNIT_TILES = 15    /* what tiles.vert reads */
-};

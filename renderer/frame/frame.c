@@ -7,19 +7,12 @@
 #include <stdio.h>
 #include <string.h>
 
-/* As ViewBlock in view.glsl. */
-struct view_block {
-    mat4 world_to_clip, clip_to_world;
-    float eye[4], forward[4], viewport[4], ambient[4], background[4], ground[4], ground_albedo[4],
-        display[4];
-};
-
-/* As ShadeBlock in shade.frag. */
-struct shade_block {
-    struct {
-        float origin[4], half_x[4], half_y[4], z[4], radiance[4];
-    } lights[PEN_MAX_LIGHTS];
-};
+#define SHARED_ROWS "renderer/shaders/frame/view.def"
+#include "renderer/shared/rows_c.h"
+#define SHARED_ROWS "renderer/shaders/frame/shade.def"
+#include "renderer/shared/rows_c.h"
+#define SHARED_ROWS "renderer/shaders/frame/average.def"
+#include "renderer/shared/rows_c.h"
 
 struct frame {
     const struct frame_job *job;
@@ -121,7 +114,7 @@ static void upload_view(struct frame *f, uint32_t number)
     b.display[2] = (float)number;
     b.display[3] = 1 / (float)r->antialias;
     gl.NamedBufferData(f->view_buffer, sizeof b, &b, GL_STREAM_DRAW);
-    gl.BindBufferBase(GL_UNIFORM_BUFFER, GL_UBO_VIEW, f->view_buffer);
+    gl.BindBufferBase(GL_UNIFORM_BUFFER, UBO_VIEW, f->view_buffer);
 }
 
 /* Point `index` of the Halton sequence in bases 2 and 3, centred on 0. */
@@ -174,8 +167,8 @@ static bool record_face(
     struct technique_ctx *ctx = job->ctx;
     glm_mat4_mul(face->world_to_light, f->view.clip_to_world, face->clip_to_light);
     gl.NamedBufferData(ctx->light_block, sizeof *face, face, GL_STREAM_DRAW);
-    gl.BindBufferBase(GL_UNIFORM_BUFFER, GL_UBO_LIGHT, ctx->light_block);
-    gl.BindBufferBase(GL_UNIFORM_BUFFER, GL_UBO_PARAMS, ctx->param_block);
+    gl.BindBufferBase(GL_UNIFORM_BUFFER, UBO_LIGHT, ctx->light_block);
+    gl.BindBufferBase(GL_UNIFORM_BUFFER, UBO_PARAMS, ctx->param_block);
     const struct emission *emission = f->emissions[light];
     struct technique_run run = {.ctx = ctx,
         .scene = job->scene,
@@ -245,8 +238,8 @@ static void make_shade_block(const struct frame *f, struct shade_block *b)
         const struct light_face *face = &l->faces[0];
         const struct pen_light *s = l->source;
         scale3(b->lights[i].origin, l->origin, 1, (float)s->type);
-        scale3(b->lights[i].half_x, l->x, face->half[0], s->radius);
-        scale3(b->lights[i].half_y, l->y, face->half[1], cosf(glm_rad(s->inner_cone_deg)));
+        scale3(b->lights[i].half_x, l->x, face->extent[0], s->radius);
+        scale3(b->lights[i].half_y, l->y, face->extent[1], cosf(glm_rad(s->inner_cone_deg)));
         scale3(b->lights[i].z, l->z, 1, cosf(glm_rad(s->outer_cone_deg)));
         scale3(b->lights[i].radiance, l->radiance, 1, 0);
     }
@@ -263,7 +256,7 @@ static bool shade(struct frame *f, struct pen_error *error)
         {UNIT_NORMAL, t->gbuffer.normal.name, GL_SAMPLE_NEAREST},
         {UNIT_ALBEDO, t->gbuffer.albedo.name, GL_SAMPLE_NEAREST},
         {UNIT_SURFACE, t->gbuffer.surface.name, GL_SAMPLE_NEAREST},
-        {UNIT_FREE, t->vis.name, GL_SAMPLE_NEAREST},
+        {UNIT_SOURCE, t->vis.name, GL_SAMPLE_NEAREST},
         {UNIT_EMITTED, t->gbuffer.emission.name, GL_SAMPLE_NEAREST}};
     bool rect = false, round = false, punctual = false;
     for (uint32_t i = 0; i < f->light_count; i++) {
@@ -295,9 +288,9 @@ static bool shade(struct frame *f, struct pen_error *error)
 
 static bool add_visibility(struct frame *f, struct pen_error *error)
 {
-    int32_t count[4] = {(int32_t)f->light_count};
+    struct average_block block = {.count = {(int32_t)f->light_count}};
     const struct frame_targets *t = f->job->targets;
-    struct pass_texture texture = {UNIT_FREE, t->vis.name, GL_SAMPLE_NEAREST};
+    struct pass_texture texture = {UNIT_SOURCE, t->vis.name, GL_SAMPLE_NEAREST};
     return pass_fill(f->job->ctx,
         &(struct pass_fill){.name = "average",
             .fragment = "average.frag",
@@ -308,8 +301,8 @@ static bool add_visibility(struct frame *f, struct pen_error *error)
             .width = f->job->request->width,
             .height = f->job->request->height,
             .add = true,
-            .extra = count,
-            .extra_bytes = sizeof count},
+            .extra = &block,
+            .extra_bytes = sizeof block},
         error);
 }
 

@@ -2,6 +2,9 @@
 #include "renderer/frame/output.h"
 #include "renderer/passes/map/classify.h"
 
+#define SHARED_ROWS "renderer/shaders/frame/classes.def"
+#include "renderer/shared/rows_c.h"
+
 bool frame_layers_want_classes(const struct pen_request *r)
 {
     return frame_output_needs(r, PEN_SOURCE_CLASSES);
@@ -44,7 +47,7 @@ bool frame_layers_add_classes(const struct frame_job *job, const struct gl_textu
     struct pass_texture textures[] = {
         {UNIT_DEPTH, job->targets->gbuffer.depth.name, GL_SAMPLE_NEAREST},
         {UNIT_TILES, tiles ? tiles->name : 0, GL_SAMPLE_NEAREST}};
-    int32_t tile[4] = {CLASSIFY_TILE, first ? 1 : 0};
+    struct classes_block block = {.tile = {CLASSIFY_TILE, first ? 1 : 0}};
     return pass_fill(job->ctx,
         &(struct pass_fill){.name = "classes",
             .fragment = "classes.frag",
@@ -56,8 +59,8 @@ bool frame_layers_add_classes(const struct frame_job *job, const struct gl_textu
             .width = job->request->width,
             .height = job->request->height,
             .add = true,
-            .extra = tile,
-            .extra_bytes = sizeof tile},
+            .extra = &block,
+            .extra_bytes = sizeof block},
         error);
 }
 

@@ -53,9 +53,8 @@ void frame_output_fit(struct frame_targets *t, const struct pen_request *r)
     fit_color(t, r, pixel_of(&r->output, r->output.layer));
 }
 
-struct output_block {
-    float bounds_min[4], bounds_max[4], shadings[4];
-};
+#define SHARED_ROWS "renderer/shaders/frame/output.def"
+#include "renderer/shared/rows_c.h"
 
 static void make_block(const struct frame_job *job, const struct view *view, struct output_block *b)
 {
@@ -102,7 +101,7 @@ static bool convert(const struct frame_job *job, const struct output_block *bloc
         {UNIT_NORMAL, t->gbuffer.normal.name, GL_SAMPLE_NEAREST},
         {UNIT_ALBEDO, t->gbuffer.albedo.name, GL_SAMPLE_NEAREST},
         {UNIT_SURFACE, t->gbuffer.surface.name, GL_SAMPLE_NEAREST},
-        {UNIT_FREE, source_of(t, layer)->name, GL_SAMPLE_NEAREST}};
+        {UNIT_SOURCE, source_of(t, layer)->name, GL_SAMPLE_NEAREST}};
     return pass_fill(job->ctx,
         &(struct pass_fill){.name = "output",
             .fragment = "output.frag",

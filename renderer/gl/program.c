@@ -65,20 +65,20 @@ __attribute__((format(printf, 2, 3))) static void appendf(struct text *t, const 
     append(t, line);
 }
 
-static const char *find_source(const char *name)
+static const struct gl_source *find_source(const char *name)
 {
     for (const struct gl_source *s = gl_sources; s->name; s++)
         if (!strcmp(s->name, name))
-            return s->text;
+            return s;
     return NULL;
 }
 
-#define MAX_INCLUDES 32
+#define MAX_INCLUDES 64
 
 struct expansion {
     struct text *out;
     const char *body;
-    const char *seen[MAX_INCLUDES];
+    const struct gl_source *seen[MAX_INCLUDES];
     uint32_t seen_count;
 };
 
@@ -87,16 +87,18 @@ static bool expand(struct expansion *e, const char *name, struct pen_error *erro
     static const char directive[] = "#include \"";
     if (!strcmp(name, "BODY"))
         name = e->body ? e->body : "";
-    const char *text = find_source(name);
-    if (!text)
+    const struct gl_source *source = find_source(name);
+    if (!source)
         return pen_fail(error, PEN_INTERNAL, "", "The shader file \"%s\" does not exist.", name);
     for (uint32_t i = 0; i < e->seen_count; i++)
-        if (e->seen[i] == text)
+        if (e->seen[i] == source)
             return true;
     if (e->seen_count == MAX_INCLUDES)
         return pen_fail(error, PEN_INTERNAL, "", "Too many shader files are included.");
-    e->seen[e->seen_count++] = text;
-    for (const char *line = text; *line;) {
+    e->seen[e->seen_count++] = source;
+    for (const struct gl_constant *c = source->constants; c && c->name; c++)
+        appendf(e->out, "#define %s %d%s\n", c->name, c->value, c->is_unsigned ? "u" : "");
+    for (const char *line = source->text; *line;) {
         const char *end = strchrnul(line, '\n');
         if (!strncmp(line, directive, sizeof directive - 1)) {
             char included[64];
@@ -155,7 +157,7 @@ static void append_params(struct text *t, const struct pen_technique_info *info,
     static const char *const types[] = {"float", "int", "uint", "uint"};
     append(t, "#define P(name) P_##name\n");
     if (info->params.count) {
-        append(t, "layout(std140, binding = 2) uniform ParamBlock {\n");
+        append(t, "layout(std140, binding = UBO_PARAMS) uniform ParamBlock {\n");
         for (uint32_t i = 0; i < info->params.count; i++)
             appendf(
                 t, "    %s p_%s;\n", types[info->params.rows[i].type], info->params.rows[i].name);
@@ -178,7 +180,10 @@ static void append_params(struct text *t, const struct pen_technique_info *info,
 static bool assemble(
     const struct gl_program_desc *desc, const char *file, struct text *out, struct pen_error *error)
 {
+    struct expansion e = {.out = out, .body = desc->body};
     append(out, "#version 450 core\n");
+    if (!expand(&e, "bindings.def", error))
+        return false;
 #define LOCATION(name, number) "#define LOCATION_" #name " " #number "\n"
     append(out,
 #include "renderer/gl/locations.def"
@@ -188,8 +193,17 @@ static bool assemble(
         append(out, desc->defines);
     if (desc->info)
         append_params(out, desc->info, desc->params);
-    struct expansion e = {.out = out, .body = desc->body};
     return expand(&e, file, error);
+}
+
+char *gl_program_text(const char *file, struct pen_error *error)
+{
+    struct text out = {0};
+    struct expansion e = {.out = &out};
+    if (expand(&e, "bindings.def", error) && expand(&e, file, error))
+        return out.data;
+    free(out.data);
+    return NULL;
 }
 
 /* The lines around the first one that the compiler's log names, as "0:LINE(". */

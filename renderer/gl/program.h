@@ -4,10 +4,15 @@
 #include "protocol/technique_info.h"
 #include "renderer/gl/gl.h"
 
+/* Binding points, for shaders too. */
+#define SHARED_ROWS "renderer/shared/bindings.def"
+#include "renderer/shared/rows_c.h"
+
 struct gl_programs;
 
-/* What a program is made of: `#version`, `defines`, the parameter block of `info` (when given),
- * then the named files, in which a line `#include "name"` is replaced once by that file. */
+/* What a program is made of: `#version`, the binding points, `defines`, the parameter block of
+ * `info` (when given), then the named files, in which a line `#include "name"` is replaced once by
+ * that file. */
 struct gl_program_desc {
     const char *vertex, *fragment, *compute; /* file names in gl_sources; NULL: no such stage */
     const char *body;    /* replaces `#include "BODY"` in the files: a technique's own file */
@@ -37,5 +42,6 @@ enum gl_location {
 };
 #undef LOCATION
 
-/* Binding points that every program shares. */
-enum gl_ubo { GL_UBO_VIEW = 0, GL_UBO_LIGHT = 1, GL_UBO_PARAMS = 2, GL_UBO_EXTRA = 3 };
+/* The file with its includes replaced, as programs have it, for code that compiles pieces of its
+ * own; free() it. NULL: see gl_programs_get. */
+char *gl_program_text(const char *file, struct pen_error *error);

@@ -149,7 +149,7 @@ static void geometry_range(const struct light_face *f, const struct scene *scene
             for (int axis = 0; f->cube && axis < 2; axis++) {
                 float beside = fabsf(across(rows[axis], m->center)) - scales[axis] * m->radius;
                 beside = fmaxf(beside, fmaxf(box[axis][0], -box[axis][1]));
-                near_z = fmaxf(near_z, beside - f->half[axis]);
+                near_z = fmaxf(near_z, beside - f->extent[axis]);
             }
             if (near_z <= far_z)
                 range[0] = fminf(range[0], near_z);
@@ -211,7 +211,7 @@ void light_face_window(
             rect[k] = -1e-3f, rect[2 + k] = 1e-3f;
         if (!f->parallel) {
             /* A cube face also serves the filter windows that reach over its border. */
-            float reach = slope * n + (f->cube ? 1.02f * f->half[k] + 0.02f * n : 0);
+            float reach = slope * n + (f->cube ? 1.02f * f->extent[k] + 0.02f * n : 0);
             rect[k] = fmaxf(rect[k], sample[k] - reach);
             rect[2 + k] = fminf(rect[2 + k], sample[k] + reach);
             if (!(rect[k] < rect[2 + k]))
@@ -280,17 +280,17 @@ static void init_face(struct light_face *f, const struct pen_light *source)
         f->emission_mean[i] = 1;
     switch (source->type) {
     case PEN_LIGHT_RECT:
-        f->half[0] = 0.5f * source->width, f->half[1] = 0.5f * source->height;
+        f->extent[0] = 0.5f * source->width, f->extent[1] = 0.5f * source->height;
         break;
     case PEN_LIGHT_DISK:
     case PEN_LIGHT_SPHERE:
-        f->shape = LIGHT_DISK;
-        f->half[0] = f->half[1] = source->radius;
+        f->shape = SHAPE_DISK;
+        f->extent[0] = f->extent[1] = source->radius;
         break;
     case PEN_LIGHT_SUN:
-        f->shape = LIGHT_DISK;
+        f->shape = SHAPE_DISK;
         f->parallel = 1;
-        f->half[0] = f->half[1] = tanf(0.5f * glm_rad(source->angular_diameter_deg));
+        f->extent[0] = f->extent[1] = tanf(0.5f * glm_rad(source->angular_diameter_deg));
         break;
     case PEN_LIGHT_SPOT:
         f->cone_cos = cosf(glm_rad(source->outer_cone_deg));

@@ -4,26 +4,9 @@
 #include "renderer/scene/scene.h"
 #include "renderer/scene/view.h"
 
-enum light_shape { LIGHT_RECT = 0, LIGHT_DISK = 1 };
-
-/* One light space (docs/light-space.md): right-handed, origin in the centre of the emitter, +z
- * along the emission. The shadow map is the window `rect` of the plane z = near_z, in metres; for a
- * parallel light x and y of the map are x and y of light space. std140: uploaded as it is. */
-struct light_face {
-    mat4 world_to_light;
-    mat4 clip_to_light; /* of the current view; set per frame */
-    float rect[4];      /* xmin, ymin, xmax, ymax */
-    float half[2];      /* half extents of the emitter, m; parallel: tan of half the diameter */
-    float near_z, far_z;
-    float emission_mean[4]; /* mean of the emission texture; white without one */
-    int32_t shape;          /* enum light_shape: half is (radius, radius) for a disk */
-    int32_t parallel;
-    int32_t cube;     /* 1: a face of six, which only owns receivers with |x|, |y| <= z */
-    int32_t textured; /* 1: an emission texture is bound */
-    float cone_cos;   /* spot: cosine of the outer half angle; else -1 */
-    int32_t omni;     /* 1: emits to all sides, so a receiver behind the plane z = 0 is lit too */
-    float pad[2];
-};
+/* struct light_face, one light space: uploaded as it is. */
+#define SHARED_ROWS "renderer/shaders/light/light.def"
+#include "renderer/shared/rows_c.h"
 
 struct light {
     const struct pen_light *source;

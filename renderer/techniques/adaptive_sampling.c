@@ -369,7 +369,7 @@ static bool resolve(struct refinement *r, struct pen_error *error)
 static uint32_t deepest_level(const struct technique_run *run)
 {
     const struct adaptive_sampling *params = run->params;
-    bool point = !(run->face->half[0] > 0 || run->face->half[1] > 0);
+    bool point = !(run->face->extent[0] > 0 || run->face->extent[1] > 0);
     uint32_t level = point ? 0 : params->levels;
     while (level > 0 &&
            (uint64_t)light_pages(level) * run->width * run->height * 4 > run->ctx->shadow_budget)
@@ -384,7 +384,7 @@ static bool record(struct technique_run *run, struct pen_error *error)
     uint64_t map_bytes = (uint64_t)params->map_size * params->map_size * 4;
     uint64_t most = run->ctx->shadow_budget / map_bytes;
     uint32_t deepest = deepest_level(run);
-    bool point = !(run->face->half[0] > 0 || run->face->half[1] > 0);
+    bool point = !(run->face->extent[0] > 0 || run->face->extent[1] > 0);
     bool short_of = !point && deepest < params->levels;
     memset(&r, 0, sizeof r);
     r.run = run;

@@ -267,7 +267,7 @@ static bool record(struct technique_run *run, struct pen_error *error)
     pass_clear_sum(run);
     for (uint32_t i = 0; i < CASCADES; i++) {
         static struct cascade c; /* large, and only one thread renders */
-        bool point = !(face->half[0] > 0 || face->half[1] > 0);
+        bool point = !(face->extent[0] > 0 || face->extent[1] > 0);
         c.number = i;
         c.side = point ? 1 : sides[i];
         c.map_size = sizes[i];

@@ -57,7 +57,7 @@ static bool trace(struct technique_run *run, struct pen_error *error)
     struct ray_job job = {.samples = params->samples,
         .target_error = params->target_error,
         .weighting = params->weighting,
-        .adaptive = params->adaptive.on && run->face->half[0] > 0,
+        .adaptive = params->adaptive.on && run->face->extent[0] > 0,
         .seed = params->seed + run->frame + LIGHT_SEED * run->light_index};
     struct pen_error refused = {0};
 #ifdef PENUMBRA_HAVE_TRACE

@@ -1,9 +1,7 @@
 #include "tests/accuracy/compute.h"
 #include "renderer/gl/context.h"
-#include "renderer/gl/source.h"
 #include "tests/unit/check.h"
 #include <stdlib.h>
-#include <string.h>
 
 bool compute_begin(struct technique_ctx *ctx, struct gl_context **context)
 {
@@ -30,24 +28,19 @@ void compute_end(struct technique_ctx *ctx, struct gl_context *context)
     gl_context_destroy(context);
 }
 
-static const char *source(const char *name)
-{
-    const struct gl_source *s = gl_sources;
-    while (s->name && strcmp(s->name, name))
-        s++;
-    return s->name ? s->text : "";
-}
-
 void compute_run(const char *const *files, const char *main_text, uint32_t groups)
 {
     const char *texts[8] = {"#version 450 core\nlayout(local_size_x = 64) in;\n"};
+    char *owned[8] = {0};
     int count = 1;
     for (; files[count - 1]; count++)
-        texts[count] = source(files[count - 1]);
+        texts[count] = owned[count] = gl_program_text(files[count - 1], NULL);
     texts[count++] = main_text;
     GLuint shader = gl.CreateShader(GL_COMPUTE_SHADER), program = gl.CreateProgram();
     gl.ShaderSource(shader, count, texts, NULL);
     gl.CompileShader(shader);
+    for (int i = 0; i < count; i++)
+        free(owned[i]);
     gl.AttachShader(program, shader);
     gl.LinkProgram(program);
     GLint ok = 0;

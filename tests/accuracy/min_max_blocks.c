@@ -61,7 +61,7 @@ static double check_level(const float *depth, uint32_t side, const struct gl_tex
 static void check_side(uint32_t side, bool parallel)
 {
     struct light_face face = {.near_z = (float)NEAR_Z, .far_z = (float)FAR_Z, .parallel = parallel};
-    GLuint block = compute_buffer(&face, sizeof face, GL_UNIFORM_BUFFER, GL_UBO_LIGHT);
+    GLuint block = compute_buffer(&face, sizeof face, GL_UNIFORM_BUFFER, UBO_LIGHT);
     struct gl_texture map = gl_texture_create(GL_DEPTH_COMPONENT32F, side, side, 0, 1);
     struct gl_texture pyramid = gl_texture_create(GL_RG32F, side / 2, side / 2, 0, 0);
     struct pen_error error = {0};

@@ -2,7 +2,7 @@
  * hierarchy that would have it walk for ever. */
 #include "renderer/gl/context.h"
 #include "renderer/gl/gl.h"
-#include "renderer/gl/source.h"
+#include "renderer/gl/program.h"
 #include "renderer/trace/bvh.h"
 #include "tests/unit/check.h"
 
@@ -19,14 +19,6 @@ static float uniform(float low, float high)
     return low + (high - low) * (float)(random_state >> 8) / (1 << 24);
 }
 
-static const char *source(const char *name)
-{
-    for (const struct gl_source *s = gl_sources; s->name; s++)
-        if (!strcmp(s->name, name))
-            return s->text;
-    return "";
-}
-
 static GLuint make_program(void)
 {
     static const char before[] = "#version 450 core\nlayout(local_size_x = 64) in;\n";
@@ -41,10 +33,13 @@ static GLuint make_program(void)
         "        uint(bvh_occluded(r.origin.xyz, r.direction.xyz, r.origin.w, nodes)) +\n"
         "        (bvh_cut ? 2u : 0u);\n"
         "}\n";
-    const char *texts[3] = {before, source("ray_bvh.glsl"), after};
+    char *walk = gl_program_text("ray_bvh.glsl", NULL);
+    CHECK(walk);
+    const char *texts[3] = {before, walk, after};
     GLuint shader = gl.CreateShader(GL_COMPUTE_SHADER), program = gl.CreateProgram();
     gl.ShaderSource(shader, 3, texts, NULL);
     gl.CompileShader(shader);
+    free(walk);
     gl.AttachShader(program, shader);
     gl.LinkProgram(program);
     GLint ok = 0;

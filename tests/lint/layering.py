@@ -6,8 +6,7 @@ import tree
 
 BASICS = ("error", "fnv", "hex", "layer", "limits", "memory", "param", "request", "result", "srgb",
           "technique_info")
-FLOOR_1 = ["protocol/%s.h" % name for name in BASICS] + [
-    "protocol/codes.def", "protocol/layers.def", "protocol/request.def"]
+FLOOR_1 = ["protocol/%s.h" % name for name in BASICS] + ["protocol/*.def"]
 PURE = set("""assert ctype errno fenv float inttypes limits locale math stdalign stdarg stdatomic
     stdbool stddef stdint stdio stdlib string strings time""".split())
 SYSTEM = PURE | set("""byteswap dirent dlfcn endian fcntl fnmatch getopt glob immintrin libgen link

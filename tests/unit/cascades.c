@@ -136,8 +136,8 @@ static void make_stage(struct stage *s, bool parallel)
     f->world_to_light[3][2] = -glm_vec3_dot(z, from);
     f->world_to_light[3][3] = 1;
     f->parallel = parallel;
-    f->half[0] = parallel ? 0.1f : 0.5f;
-    f->half[1] = parallel ? 0.1f : 0.3f;
+    f->extent[0] = parallel ? 0.1f : 0.5f;
+    f->extent[1] = parallel ? 0.1f : 0.3f;
     f->cone_cos = -1;
     f->near_z = 1.2f, f->far_z = 5;
     s->light.face_count = 1;
@@ -173,7 +173,7 @@ static int check_blockers(struct stage *s)
             world[k] = s->view.eye[k] + distance * ray[k];
         glm_mat4_mulv3((vec4 *)f->world_to_light, world, 1, p);
         float uv[2] = {2 * (float)random_unit() - 1, 2 * (float)random_unit() - 1};
-        float at[2] = {uv[0] * f->half[0], uv[1] * f->half[1]}, u = (float)random_unit();
+        float at[2] = {uv[0] * f->extent[0], uv[1] * f->extent[1]}, u = (float)random_unit();
         /* From the receiver towards the sample. */
         for (int k = 0; k < 3; k++)
             c[k] = f->parallel ? p[k] + 5 * u * (k < 2 ? at[k] : -1)

@@ -22,7 +22,7 @@ struct pass_screen {
     GLuint framebuffer;             /* 0: run->vis_framebuffer */
     bool add;                       /* blends ONE, ONE instead of replacing */
     const struct gl_texture *tiles; /* of pass_classify: only undecided tiles are drawn; or NULL */
-    const void *extra;              /* contents of the uniform block GL_UBO_EXTRA, or NULL */
+    const void *extra;              /* contents of the uniform block UBO_EXTRA, or NULL */
     uint32_t extra_bytes;
 };
 bool pass_screen(

@@ -24,7 +24,7 @@ static GLuint bind_extra(const void *extra, uint32_t bytes)
     if (extra) {
         gl.CreateBuffers(1, &buffer);
         gl.NamedBufferStorage(buffer, bytes, extra, 0);
-        gl.BindBufferBase(GL_UNIFORM_BUFFER, GL_UBO_EXTRA, buffer);
+        gl.BindBufferBase(GL_UNIFORM_BUFFER, UBO_EXTRA, buffer);
     }
     return buffer;
 }

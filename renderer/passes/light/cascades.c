@@ -104,7 +104,7 @@ static bool make_slab(
         return false;
     slab->z[0] = fmaxf(slab->z[0], n);
     for (int k = 0; k < 2; k++) {
-        float reach = face->half[k] * search_of(face, slab->z[1]);
+        float reach = face->extent[k] * search_of(face, slab->z[1]);
         float low = face->rect[k] - reach, high = face->rect[2 + k] + reach;
         if (face->cube) /* receivers beyond the pyramid belong to another face */
             low = fmaxf(low, -1.01f * n), high = fminf(high, 1.01f * n);
@@ -227,7 +227,7 @@ bool cascade_window(const struct light_face *face, const float casters[2][3],
     for (int k = 0; k < 2; k++) {
         float cell = (face->rect[2 + k] - face->rect[k]) / STEPS;
         float a = sample[k] * shift[0], b = sample[k] * shift[1];
-        float margin = face->half[k] * fmaxf(search, 0) / (float)side;
+        float margin = face->extent[k] * fmaxf(search, 0) / (float)side;
         float low = face->rect[k] + (float)bounds->low[k] * cell + fminf(a, b) - margin;
         float high = face->rect[k] + (float)bounds->high[k] * cell + fmaxf(a, b) + margin;
         float room = (float)size - 2 * (float)(texels + 1);

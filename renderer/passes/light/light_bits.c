@@ -39,7 +39,7 @@ static void make_point(
         point[0] = (2 * (float)(index % side) + 1) / (float)side - 1;
         point[1] = (2 * (float)(index / side) + 1) / (float)side - 1;
     }
-    if (bits->shape == LIGHT_DISK)
+    if (bits->shape == SHAPE_DISK)
         to_disk(point);
 }
 

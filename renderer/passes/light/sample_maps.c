@@ -26,10 +26,10 @@ static void to_disk(float uv[2])
 struct sample_point sample_point_at(const struct light_face *face, float u, float v)
 {
     struct sample_point point = {.uv = {u, v}};
-    if (face->shape == LIGHT_DISK)
+    if (face->shape == SHAPE_DISK)
         to_disk(point.uv);
     for (int k = 0; k < 2; k++)
-        point.at[k] = point.uv[k] * face->half[k];
+        point.at[k] = point.uv[k] * face->extent[k];
     return point;
 }
 

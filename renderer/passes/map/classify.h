@@ -6,7 +6,9 @@
 
 #define CLASSIFY_TILE 8 /* px */
 
-enum tile_class { TILE_LIT, TILE_UNDECIDED, TILE_UMBRA, TILE_EMPTY };
+/* enum tile_class */
+#define SHARED_ROWS "renderer/shaders/screen/tile_class.def"
+#include "renderer/shared/rows_c.h"
 
 /* Classifies run's face and writes 0 to the umbra tiles of vis. `margin_texels`: how far beyond the
  * filter windows the method may look. Adds the receivers to run->result->class_pixels, and the

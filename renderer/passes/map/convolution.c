@@ -44,7 +44,7 @@ void convolution_fit(struct convolution_block *block, const struct convolution_d
     for (int k = 0; k < 2; k++) {
         double reach = face->far_z - face->near_z;
         double half =
-            (double)face->half[k] * (face->parallel ? reach : reach / (double)face->far_z);
+            (double)face->extent[k] * (face->parallel ? reach : reach / (double)face->far_z);
         double texel = (double)(face->rect[2 + k] - face->rect[k]) / desc->size;
         texels *= fmin(fmax(2 * half / texel + 4, least), desc->size);
     }

@@ -94,7 +94,7 @@ static void fit(const struct light_face *f, const struct sat_table *table, struc
         float widest = 0;
         for (int k = 0; k < 2; k++) {
             float reach = f->far_z - f->near_z;
-            float half = f->half[k] * (f->parallel ? reach : reach / f->far_z);
+            float half = f->extent[k] * (f->parallel ? reach : reach / f->far_z);
             float texel = (f->rect[2 + k] - f->rect[k]) / (float)side;
             block->window[k] = fminf(fmaxf(2 * half / texel, least), (float)side);
             widest = fmaxf(widest, block->window[k]);

@@ -56,7 +56,7 @@ static void make_face_key(const struct light_face *face, struct face_key *key)
     memset(key, 0, sizeof *key);
     memcpy(key->world_to_light, face->world_to_light, sizeof key->world_to_light);
     memcpy(key->rect, face->rect, sizeof key->rect);
-    memcpy(key->half, face->half, sizeof key->half);
+    memcpy(key->half, face->extent, sizeof key->half);
     key->range[0] = face->near_z, key->range[1] = face->far_z;
     key->cone = face->cone_cos;
     key->shape = face->shape, key->parallel = face->parallel, key->cube = face->cube;

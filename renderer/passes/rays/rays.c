@@ -28,7 +28,7 @@ struct pen_trace_light ray_light(const struct technique_run *run)
     memcpy(t.x, light->x, sizeof t.x);
     memcpy(t.y, light->y, sizeof t.y);
     memcpy(t.z, light->z, sizeof t.z);
-    memcpy(t.half, light->faces[0].half, sizeof t.half);
+    memcpy(t.half, light->faces[0].extent, sizeof t.half);
     return t;
 }
 

@@ -155,7 +155,7 @@ static void bind(const struct work *w)
 {
     const struct ray_targets *t = w->targets;
     ray_scene_bind(w->scene);
-    gl.BindBufferBase(GL_UNIFORM_BUFFER, GL_UBO_EXTRA, t->job);
+    gl.BindBufferBase(GL_UNIFORM_BUFFER, UBO_EXTRA, t->job);
     gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, BUFFER_POINTS, t->points);
     gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, BUFFER_STATE, t->state);
     gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, BUFFER_LIST, t->list);

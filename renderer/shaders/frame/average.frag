@@ -1,9 +1,7 @@
 // Mean over the lights of one frame's visibility, weighted for accumulation over frames.
 #include "view.glsl"
-layout(binding = 7) uniform sampler2DArray visibility_maps;
-layout(std140, binding = 3) uniform AverageBlock {
-    ivec4 count; // lights
-} average;
+#include "average.def"
+layout(binding = UNIT_SOURCE) uniform sampler2DArray visibility_maps;
 layout(location = 0) out vec4 sum;
 
 void main()

@@ -1,3 +1,5 @@
+#include "tone_maps.def"
+
 // From scene radiance to display values. sRGB (IEC 61966-2-1) by a least-squares sum of roots
 // instead of a power: error below 6e-5, a quarter of a 14-bit step.
 vec3 srgb_encode(vec3 c)
@@ -8,14 +10,14 @@ vec3 srgb_encode(vec3 c)
     return mix(min(curve, 1.0), 12.92 * c, lessThanEqual(c, vec3(0.0031308)));
 }
 
-// Tone curves: 0 clip, 1 Reinhard 2002 on luminance, 2 the ACES filmic fit of Narkowicz 2015.
+// view.display.y: enum pen_tone_map.
 vec3 display_encode(vec3 radiance)
 {
     vec3 c = max(radiance * view.display.x, 0.0);
     int curve = int(view.display.y);
-    if (curve == 1)
+    if (curve == PEN_TONE_REINHARD)
         c /= 1.0 + dot(c, vec3(0.2126, 0.7152, 0.0722));
-    else if (curve == 2)
+    else if (curve == PEN_TONE_ACES)
         c = c * (2.51 * c + 0.03) / (c * (2.43 * c + 0.59) + 0.14);
     return srgb_encode(c);
 }

@@ -4,17 +4,14 @@
 #include "view.glsl"
 #include "octahedral.glsl"
 #include "display.glsl"
+#include "output.def"
 
-layout(binding = 0) uniform sampler2D g_depth;
-layout(binding = 1) uniform sampler2D g_normal;
-layout(binding = 2) uniform sampler2D g_albedo;
-layout(binding = 3) uniform sampler2D g_surface;
-layout(binding = 7) uniform sampler2D accumulated; // sum of beauty, visibility, classes, variance
-layout(std140, binding = 3) uniform OutputBlock {
-    vec4 bounds_min; // world; w: nearest view distance shown
-    vec4 bounds_max; // w: farthest
-    vec4 shadings;   // x: lights times frames
-} range;
+layout(binding = UNIT_DEPTH) uniform sampler2D g_depth;
+layout(binding = UNIT_NORMAL) uniform sampler2D g_normal;
+layout(binding = UNIT_ALBEDO) uniform sampler2D g_albedo;
+layout(binding = UNIT_SURFACE) uniform sampler2D g_surface;
+// Sum of beauty, visibility, classes, variance.
+layout(binding = UNIT_SOURCE) uniform sampler2D accumulated;
 
 layout(location = 0) out vec4 color;
 

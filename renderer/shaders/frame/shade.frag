@@ -5,27 +5,16 @@
 #include "octahedral.glsl"
 #include "irradiance.glsl"
 #include "display.glsl"
+#include "shade.def"
 
-layout(binding = 0) uniform sampler2D g_depth;
-layout(binding = 1) uniform sampler2D g_normal;
-layout(binding = 2) uniform sampler2D g_albedo;
-layout(binding = 3) uniform sampler2D g_surface;
+layout(binding = UNIT_DEPTH) uniform sampler2D g_depth;
+layout(binding = UNIT_NORMAL) uniform sampler2D g_normal;
+layout(binding = UNIT_ALBEDO) uniform sampler2D g_albedo;
+layout(binding = UNIT_SURFACE) uniform sampler2D g_surface;
 #ifdef EMIT
-layout(binding = 4) uniform sampler2D g_emission;
+layout(binding = UNIT_EMITTED) uniform sampler2D g_emission;
 #endif
-layout(binding = 7) uniform sampler2DArray visibility_maps;
-
-const int RECT = 0, DISK = 1, SPHERE = 2, SUN = 3, POINT = 4, SPOT = 5;
-struct ShadeLight {
-    vec4 origin;   // w: type
-    vec4 half_x;   // w: radius
-    vec4 half_y;   // w: cosine of the inner cone
-    vec4 z;        // w: cosine of the outer cone
-    vec4 radiance; // w: area, m^2
-};
-layout(std140, binding = 3) uniform ShadeBlock {
-    ShadeLight lights[8];
-} shade;
+layout(binding = UNIT_SOURCE) uniform sampler2DArray visibility_maps;
 
 layout(location = 0) out vec4 color;
 
@@ -61,7 +50,7 @@ vec3 specular_area(Material m, ShadeLight s, vec3 p, vec3 n, vec3 v)
 #endif
     vec3 half_x = s.half_x.xyz, half_y = s.half_y.xyz, axis = s.z.xyz, to = s.origin.xyz - p;
 #ifdef HAS_ROUND
-    if (type == SPHERE) { // the disk that faces the receiver
+    if (type == PEN_LIGHT_SPHERE) { // the disk that faces the receiver
         axis = -normalize(to);
         vec3 up = abs(axis.y) < 0.9 ? vec3(0.0, 1.0, 0.0) : vec3(1.0, 0.0, 0.0);
         half_x = normalize(cross(up, axis)) * s.half_x.w;
@@ -69,7 +58,7 @@ vec3 specular_area(Material m, ShadeLight s, vec3 p, vec3 n, vec3 v)
     }
 #endif
     vec2 size2 = vec2(dot(half_x, half_x), dot(half_y, half_y));
-    float cell = (type == RECT ? 4.0 : 3.14159265) * sqrt(size2.x * size2.y) / float(k * k);
+    float cell = (type == PEN_LIGHT_RECT ? 4.0 : 3.14159265) * sqrt(size2.x * size2.y) / float(k * k);
     // The lobe is widened by the solid angle that one cell stands for.
     float to2 = dot(to, to), a = m.alpha + min(0.25 * sqrt(cell / to2), 0.5);
     float nv = max(dot(n, v), 1e-3), facing = max(-dot(axis, to), 0.0);
@@ -80,7 +69,7 @@ vec3 specular_area(Material m, ShadeLight s, vec3 p, vec3 n, vec3 v)
     for (int i = 0; i < k * k; i++) {
         vec2 u = (vec2(i % k, i / k) + 0.5) * (2.0 / float(k)) - 1.0;
 #ifdef HAS_ROUND
-        if (type != RECT) { // concentric map of Shirley and Chiu
+        if (type != PEN_LIGHT_RECT) { // concentric map of Shirley and Chiu
             bool wide = abs(u.x) > abs(u.y);
             float r = wide ? u.x : u.y;
             float t = 0.78539816 * (wide ? u.y / u.x : (r == 0.0 ? 0.0 : 2.0 - u.x / u.y));
@@ -100,16 +89,16 @@ vec3 reflected_area(Material m, ShadeLight s, vec3 p, vec3 n, vec3 v)
     int type = int(s.origin.w);
     float e = 0.0;
 #ifdef HAS_RECT
-    if (type == RECT)
+    if (type == PEN_LIGHT_RECT)
         e = irradiance_rect(p, n, s.origin.xyz, s.half_x.xyz, s.half_y.xyz);
 #endif
 #ifdef HAS_ROUND
-    if (type == DISK)
+    if (type == PEN_LIGHT_DISK)
         e = irradiance_disk(p, n, s.origin.xyz, s.half_x.xyz, s.half_y.xyz);
-    if (type == SPHERE)
+    if (type == PEN_LIGHT_SPHERE)
         e = irradiance_sphere(p, n, s.origin.xyz, s.half_x.w);
 #endif
-    bool behind = type != SPHERE && dot(s.origin.xyz - p, s.z.xyz) >= 0.0;
+    bool behind = type != PEN_LIGHT_SPHERE && dot(s.origin.xyz - p, s.z.xyz) >= 0.0;
     if (behind || e <= 0.0)
         return vec3(0.0);
     return m.diffuse * (e / 3.14159265) + specular_area(m, s, p, n, v);
@@ -121,12 +110,12 @@ vec3 reflected_punctual(Material m, ShadeLight s, vec3 p, vec3 n, vec3 v)
 {
     int type = int(s.origin.w);
     vec3 to = s.origin.xyz - p;
-    vec3 l = type == SUN ? -s.z.xyz : normalize(to);
+    vec3 l = type == PEN_LIGHT_SUN ? -s.z.xyz : normalize(to);
     float nl = dot(n, l);
     if (nl <= 0.0)
         return vec3(0.0);
-    float e = type == SUN ? nl : nl / dot(to, to);
-    if (type == SPOT)
+    float e = type == PEN_LIGHT_SUN ? nl : nl / dot(to, to);
+    if (type == PEN_LIGHT_SPOT)
         e *= pow(clamp((dot(-l, s.z.xyz) - s.z.w) / max(s.half_y.w - s.z.w, 1e-4), 0.0, 1.0), 2.0);
     float nv = max(dot(n, v), 1e-3);
     return (m.diffuse * (1.0 / 3.14159265) + specular_brdf(m.f0, m.alpha, nv, nl, dot(v, l)) / nl) * e;
@@ -136,7 +125,7 @@ vec3 reflected_punctual(Material m, ShadeLight s, vec3 p, vec3 n, vec3 v)
 vec3 reflected(Material m, ShadeLight s, vec3 p, vec3 n, vec3 v)
 {
 #if (defined(HAS_RECT) || defined(HAS_ROUND)) && defined(HAS_PUNCTUAL)
-    return int(s.origin.w) >= SUN ? reflected_punctual(m, s, p, n, v) : reflected_area(m, s, p, n, v);
+    return int(s.origin.w) >= PEN_LIGHT_SUN ? reflected_punctual(m, s, p, n, v) : reflected_area(m, s, p, n, v);
 #elif defined(HAS_PUNCTUAL)
     return reflected_punctual(m, s, p, n, v);
 #elif defined(HAS_RECT) || defined(HAS_ROUND)

@@ -1,22 +1,7 @@
 // Light space: origin in the centre of the emitter, +z along the emission, the shadow map is the
 // window `rect` of the plane z = near_z. A parallel light is the limit of an emitter infinitely far
 // away: `extent` is then the tangent of half its diameter. docs/light-space.md derives F1 to F6.
-layout(std140, binding = 1) uniform LightBlock {
-    mat4 world_to_light;
-    mat4 clip_to_light;
-    vec4 rect;          // xmin, ymin, xmax, ymax, m
-    vec2 extent;        // half extents of the emitter, m
-    float near_z, far_z;
-    vec4 emission_mean;
-    int shape;          // 0 rectangle, 1 disk
-    int parallel;
-    int cube;
-    int textured;
-    float cone_cos;
-    int omni;
-} light;
-
-const int SHAPE_RECT = 0, SHAPE_DISK = 1;
+#include "light.def"
 
 // What never changes within a pass is a constant of the program where the pass defines it: software
 // rasterisers run both sides of every branch.
@@ -28,8 +13,8 @@ const bool light_parallel = LIGHT_PARALLEL != 0;
 #define light_parallel (light.parallel != 0)
 #endif
 
-layout(binding = 5) uniform sampler2D emission_texture; // of the light, with mips
-layout(binding = 6) uniform sampler2D shadow_map;       // hardware depth, border 1
+layout(binding = UNIT_EMISSION) uniform sampler2D emission_texture; // of the light, with mips
+layout(binding = UNIT_SHADOW) uniform sampler2D shadow_map;         // hardware depth, border 1
 
 // F1: where the map shows light-space point p, metres on the map plane.
 vec2 light_project(vec3 p)

@@ -14,7 +14,7 @@
             .unit = "1/terms of the depth range",                                                  \
             .help = "Moves receivers towards the light, so that they do not block themselves; 0 "  \
                     "doubles the visibility instead."),                                            \
-        PARAM(aggregate, contact, .def = 1, .specialise = 1,                                       \
+        PARAM(aggregate, contact, .def = 1,                                                        \
             .help =                                                                                \
                 "Measures each lookup against its nearest caster, which keeps contacts dark."),    \
         PARAM(aggregate, storage, .def = default_storage, .choices = convolution_format_names,     \
@@ -27,7 +27,8 @@
 #define CONVOLUTION_DESC(params, with_depth)                                                       \
     {                                                                                              \
         .size = (params)->map_size, .terms = (params)->terms, .format = (params)->storage,         \
-        .damping = (params)->damping, .offset = (params)->offset, .weighted = (with_depth)         \
+        .damping = (params)->damping, .offset = (params)->offset, .weighted = (with_depth),        \
+        .contact = (params)->contact.on                                                            \
     }
 
 /* Prepares the maps and runs the pass, whose body includes convolution.glsl, over the receivers.
@@ -53,9 +54,9 @@ static inline bool convolution_screen(struct technique_run *run,
     pass.texture_count = 3;
     pass.extra = &block;
     pass.extra_bytes = sizeof block;
-    char defines[64];
-    snprintf(defines, sizeof defines, "%s%s", tables ? "#define TABLES\n" : "",
-        pass.defines ? pass.defines : "");
+    char defines[96];
+    snprintf(defines, sizeof defines, "%s%s%s", tables ? "#define TABLES\n" : "",
+        desc->contact ? "#define CONTACT\n" : "", pass.defines ? pass.defines : "");
     pass.defines = defines;
     return pass_screen(run, &pass, error);
 }

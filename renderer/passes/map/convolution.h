@@ -17,6 +17,7 @@ struct convolution_desc {
     float damping;   /* alpha of exp(-alpha (k / M)^2) */
     float offset;    /* of the receiver towards the light, in 1/M of the scaled depth */
     bool weighted;   /* also the series times depth, for the blocker average */
+    bool contact;    /* lookups are measured against their nearest caster; not the maps' */
 };
 
 /* As ConvolutionBlock in convolution.glsl. */

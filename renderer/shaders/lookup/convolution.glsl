@@ -190,7 +190,7 @@ vec2 cell_center(int i, ivec2 cells, out vec2 half_cell)
     return radius * (wide ? vec2(cos(angle), sin(angle)) : vec2(sin(angle), cos(angle)));
 }
 
-// Visible share behind one lookup: f rescaled so that the ripple reaches 0 and 1. With `contact`
+// Visible share behind one lookup: f rescaled so that the ripple reaches 0 and 1. With CONTACT
 // also so that a cell full of its nearest caster reaches 0, even when that caster is so near to the
 // receiver that it lies on the step: two planes are then told apart at most distances. Nearer still
 // the step is kept, or receivers that shadow themselves come out in specks.
@@ -199,17 +199,15 @@ float cell_visibility(Receiver r, float f, float depth, vec2 offset, vec2 extent
 #ifdef RAW
     return f;
 #else
-    float low = series.low, range = 1.0 / series.scale;
-    if (P(contact)) {
-        float high = low + range;
-        float nearest = min(min_max_window(r.q + offset, extent).x, light.far_z);
-        float z = (nearest - light.near_z) / (light.far_z - light.near_z) * series.range;
-        float x = z - depth + series.offset;
-        if (x > -series.offset)
-            low = max(low, min(series_step(x), high - 0.5));
-        range = high - low;
-    }
-    return clamp((f - low) / range, 0.0, 1.0);
+    float low = series.low, high = series.low + 1.0 / series.scale;
+#ifdef CONTACT
+    float nearest = min(min_max_window(r.q + offset, extent).x, light.far_z);
+    float z = (nearest - light.near_z) / (light.far_z - light.near_z) * series.range;
+    float x = z - depth + series.offset;
+    if (x > -series.offset)
+        low = max(low, min(series_step(x), high - 0.5));
+#endif
+    return clamp((f - low) / (high - low), 0.0, 1.0);
 #endif
 }
 

@@ -27,8 +27,6 @@ enum {
 #define MAX_RESIDENT 256
 #define EMISSION_BYTES (64u << 20) /* kept emission textures; they are cheap to make again */
 
-const char *const pen_device_choice_names[] = {"auto", "gpu", "surfaceless", "osmesa", NULL};
-
 struct pen_renderer {
     struct gl_context *context;
     struct technique_ctx ctx;
@@ -56,7 +54,7 @@ struct pen_renderer *pen_renderer_create(
     const struct pen_renderer_config *config, struct pen_error *error)
 {
     struct pen_renderer *r = pen_alloc_zero(1, sizeof *r);
-    r->context = gl_context_create(config, &r->ctx.device, error);
+    r->context = gl_context_create(&config->device, &r->ctx.device, error);
     if (!r->context) {
         free(r);
         return NULL;

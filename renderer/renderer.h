@@ -3,23 +3,13 @@
 #pragma once
 #include "protocol/result.h"
 #include "protocol/technique_info.h"
-#include <stddef.h>
+#include "renderer/device.h"
+#include "renderer/picture.h"
 
 struct pen_renderer;
 
-enum pen_device_choice {
-    PEN_DEVICE_AUTO,
-    PEN_DEVICE_GPU,
-    PEN_DEVICE_SURFACELESS,
-    PEN_DEVICE_OSMESA
-};
-extern const char *const pen_device_choice_names[]; /* "auto", "gpu", "surfaceless", "osmesa" */
-
 struct pen_renderer_config {
-    uint32_t device;           /* enum pen_device_choice */
-    uint32_t device_index;     /* which EGL device, counting GPUs from 0 */
-    bool require_gpu;          /* fail rather than run in software */
-    bool debug;                /* GL debug output to stderr */
+    struct pen_device_config device;
     uint64_t gpu_memory_bytes; /* budget for scenes, images and shadow inputs; 0: 1 GiB */
     uint32_t programs;         /* most compiled programs kept between frames; 0: 256 */
 };
@@ -46,24 +36,6 @@ struct pen_program_counts pen_renderer_programs(const struct pen_renderer *rende
 bool pen_renderer_load_image(struct pen_renderer *renderer, const uint8_t id[PEN_ID_BYTES],
     int blob_fd, struct pen_error *error);
 bool pen_renderer_has_image(const struct pen_renderer *renderer, const uint8_t id[PEN_ID_BYTES]);
-
-enum pen_pixel { PEN_PIXEL_RGBA8, PEN_PIXEL_RGBA16F, PEN_PIXEL_RGBA32F };
-
-struct pen_plane {
-    char name[16];     /* layer name */
-    uint32_t pixel;    /* enum pen_pixel */
-    uint32_t channels; /* meaningful ones of the four: 1, 3 or 4 */
-    void *data;        /* width * height pixels, tight, top row first */
-};
-
-/* Finished pixels. PEN_PIXEL_RGBA8: already tone-mapped and display-encoded. Owned by the caller,
- * who may hand it to another thread, and ends it with pen_frame_finish. */
-struct pen_frame {
-    uint32_t width, height;
-    uint32_t plane_count;
-    struct pen_plane planes[PEN_LAYERS];
-};
-void pen_frame_finish(struct pen_frame *frame);
 
 /* Renders one checked request whose scene and images are resident. Fills the times, the completed
  * request and the warnings of *result (not queue, load and encode). PEN_INVALID: the request

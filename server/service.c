@@ -205,10 +205,10 @@ static bool start_pool(struct service *s, struct pen_error *error)
         .open_job = open_job,
         .on_picture = on_picture,
         .context = s,
-        .renderer = {.device = c->device.index,
-            .device_index = (uint32_t)c->device_index,
-            .require_gpu = c->require_gpu.on,
-            .debug = c->gl_debug.on,
+        .renderer = {.device = {.choice = c->device.index,
+                         .index = (uint32_t)c->device_index,
+                         .require_gpu = c->require_gpu.on,
+                         .debug = c->gl_debug.on},
             .gpu_memory_bytes = c->gpu_memory.bytes}};
     if (!find_program(c->worker_path, "penumbra-worker", config.worker_path,
             sizeof config.worker_path, error) ||

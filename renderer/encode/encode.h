@@ -19,7 +19,7 @@
  * One channel is written as grey, three as RGB, four as RGBA; alpha is unassociated and stored
  * unchanged. NaN is written as 0, infinities as the largest finite value of the target. */
 #pragma once
-#include "renderer/renderer.h"
+#include "renderer/picture.h"
 
 struct pen_bytes {
     uint8_t *data; /* freed with pen_bytes_finish */

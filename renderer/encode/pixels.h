@@ -1,6 +1,6 @@
 /* Rows of a plane turned into what a file format stores. */
 #pragma once
-#include "renderer/renderer.h"
+#include "renderer/picture.h"
 
 enum pixels_sample { PIXELS_U8, PIXELS_U16, PIXELS_HALF, PIXELS_FLOAT };
 

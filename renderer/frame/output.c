@@ -171,10 +171,3 @@ bool frame_output_read(const struct frame_job *job, const struct view *view,
     }
     return true;
 }
-
-void pen_frame_finish(struct pen_frame *frame)
-{
-    for (uint32_t i = 0; i < frame->plane_count; i++)
-        free(frame->planes[i].data);
-    memset(frame, 0, sizeof *frame);
-}

@@ -136,7 +136,7 @@ static void close_display(struct gl_context *c)
 
 /* The wanted GPU among the EGL devices; software devices are not counted. */
 static bool create_on_gpu(
-    struct gl_context *c, const struct pen_renderer_config *config, struct pen_error *error)
+    struct gl_context *c, const struct pen_device_config *config, struct pen_error *error)
 {
     if (!open_egl(c, error))
         return false;
@@ -152,7 +152,7 @@ static bool create_on_gpu(
     for (EGLint i = 0; i < count; i++) {
         if (has_word(query_string(devices[i], EGL_EXTENSIONS), "EGL_MESA_device_software"))
             continue;
-        if (gpu++ != config->device_index)
+        if (gpu++ != config->index)
             continue;
         c->display = c->GetPlatformDisplay(EGL_PLATFORM_DEVICE_EXT, devices[i], NULL);
         if (make_egl_context(c, config->debug, error))
@@ -160,12 +160,12 @@ static bool create_on_gpu(
         close_display(c);
         return false;
     }
-    return pen_fail(error, PEN_UNAVAILABLE, "", "There is no GPU number %u; EGL sees %u.",
-        config->device_index, gpu);
+    return pen_fail(
+        error, PEN_UNAVAILABLE, "", "There is no GPU number %u; EGL sees %u.", config->index, gpu);
 }
 
 static bool create_surfaceless(
-    struct gl_context *c, const struct pen_renderer_config *config, struct pen_error *error)
+    struct gl_context *c, const struct pen_device_config *config, struct pen_error *error)
 {
     if (!open_egl(c, error))
         return false;
@@ -220,19 +220,19 @@ static void describe(struct pen_device_info *info, const char *platform)
 }
 
 struct gl_context *gl_context_create(
-    const struct pen_renderer_config *config, struct pen_device_info *info, struct pen_error *error)
+    const struct pen_device_config *config, struct pen_device_info *info, struct pen_error *error)
 {
     struct gl_context *c = pen_alloc_zero(1, sizeof *c);
     const char *platform = NULL;
     struct pen_error gpu = {0}, surfaceless = {0}, osmesa = {0};
-    bool any = config->device == PEN_DEVICE_AUTO;
-    if ((any || config->device == PEN_DEVICE_GPU) && create_on_gpu(c, config, &gpu))
+    bool any = config->choice == PEN_DEVICE_AUTO;
+    if ((any || config->choice == PEN_DEVICE_GPU) && create_on_gpu(c, config, &gpu))
         platform = "egl-device";
-    else if (!config->require_gpu && config->device != PEN_DEVICE_GPU) {
-        if ((any || config->device == PEN_DEVICE_SURFACELESS) &&
+    else if (!config->require_gpu && config->choice != PEN_DEVICE_GPU) {
+        if ((any || config->choice == PEN_DEVICE_SURFACELESS) &&
             create_surfaceless(c, config, &surfaceless))
             platform = "egl-surfaceless";
-        else if ((any || config->device == PEN_DEVICE_OSMESA) && create_osmesa(c, &osmesa))
+        else if ((any || config->choice == PEN_DEVICE_OSMESA) && create_osmesa(c, &osmesa))
             platform = "osmesa";
     }
     if (!platform) {

@@ -182,13 +182,13 @@ int main(int argc, char **argv)
     for (int i = 1; i + 1 < argc; i += 2) {
         unsigned long long value = strtoull(argv[i + 1], NULL, 10);
         if (!strcmp(argv[i], "--device"))
-            config.device = (uint32_t)value;
+            config.device.choice = (uint32_t)value;
         else if (!strcmp(argv[i], "--device-index"))
-            config.device_index = (uint32_t)value;
+            config.device.index = (uint32_t)value;
         else if (!strcmp(argv[i], "--require-gpu"))
-            config.require_gpu = value != 0;
+            config.device.require_gpu = value != 0;
         else if (!strcmp(argv[i], "--gl-debug"))
-            config.debug = value != 0;
+            config.device.debug = value != 0;
         else if (!strcmp(argv[i], "--gpu-memory"))
             config.gpu_memory_bytes = value;
         else if (!strcmp(argv[i], "--warm-up"))

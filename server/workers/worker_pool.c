@@ -78,10 +78,10 @@ static void spawn(struct slot *slot)
         return;
     }
     char device[24], index[24], gpu[4], debug[4], memory[24], warm[4];
-    snprintf(device, sizeof device, "%u", renderer->device);
-    snprintf(index, sizeof index, "%u", renderer->device_index + slot->index);
-    snprintf(gpu, sizeof gpu, "%d", renderer->require_gpu);
-    snprintf(debug, sizeof debug, "%d", renderer->debug);
+    snprintf(device, sizeof device, "%u", renderer->device.choice);
+    snprintf(index, sizeof index, "%u", renderer->device.index + slot->index);
+    snprintf(gpu, sizeof gpu, "%d", renderer->device.require_gpu);
+    snprintf(debug, sizeof debug, "%d", renderer->device.debug);
     snprintf(memory, sizeof memory, "%llu", (unsigned long long)renderer->gpu_memory_bytes);
     enum worker_warm_up warm_up = !pool->config.warm_up  ? WORKER_NO_WARM_UP
                                   : slot->is_replacement ? WORKER_WARM_UP_IDLE

@@ -6,7 +6,7 @@
 bool compute_begin(struct technique_ctx *ctx, struct gl_context **context)
 {
     struct pen_error error = {0};
-    struct pen_renderer_config config = {.debug = true};
+    struct pen_device_config config = {.debug = true};
     *context = gl_context_create(&config, &ctx->device, &error);
     if (!*context) {
         fprintf(stderr, "skipped: %s\n", error.message);

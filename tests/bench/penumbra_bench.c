@@ -401,7 +401,8 @@ int main(int argc, char **argv)
     }
     double began = seconds_now();
     struct pen_error error = {0};
-    struct pen_renderer_config config = {.device = o.device, .gpu_memory_bytes = 4ull << 30};
+    struct pen_renderer_config config = {
+        .device = {.choice = o.device}, .gpu_memory_bytes = 4ull << 30};
     struct run run = {
         .renderer = pen_renderer_create(&config, &error), .options = &o, .first = true};
     if (!run.renderer)

@@ -4,6 +4,7 @@
 #include "protocol/json_request.h"
 #include "renderer/blob/pscene.h"
 #include "renderer/encode/encode.h"
+#include "renderer/renderer.h"
 #include "renderer/generate/generate.h"
 #include <fcntl.h>
 #include <stdio.h>
@@ -60,7 +61,7 @@ int main(int argc, char **argv)
     struct pen_request request;
     if (!pen_request_from_query(pairs, count, pen_renderer_catalogue(), &request, &error))
         return report(&error);
-    struct pen_renderer_config config = {.debug = true};
+    struct pen_renderer_config config = {.device = {.debug = true}};
     struct pen_renderer *renderer = pen_renderer_create(&config, &error);
     if (!renderer)
         return report(&error);

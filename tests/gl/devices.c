@@ -36,7 +36,7 @@ int main(void)
     if (!found)
         return 77;
     /* A required GPU is never replaced by software. */
-    struct pen_renderer_config config = {.require_gpu = true};
+    struct pen_renderer_config config = {.device = {.require_gpu = true}};
     struct pen_error error = {0};
     struct pen_renderer *renderer = pen_renderer_create(&config, &error);
     CHECK(renderer ? !pen_renderer_device(renderer)->software : error.code == PEN_UNAVAILABLE);

@@ -9,7 +9,7 @@
 struct pen_renderer *fixture_renderer(uint32_t device, uint64_t gpu_memory, struct pen_error *error)
 {
     struct pen_renderer_config config = {
-        .device = device, .gpu_memory_bytes = gpu_memory, .debug = true};
+        .device = {.choice = device, .debug = true}, .gpu_memory_bytes = gpu_memory};
     memset(error, 0, sizeof *error);
     return pen_renderer_create(&config, error);
 }

@@ -10,7 +10,7 @@
 static struct pen_renderer *make(uint32_t programs)
 {
     struct pen_error error = {0};
-    struct pen_renderer_config config = {.debug = true, .programs = programs};
+    struct pen_renderer_config config = {.device = {.debug = true}, .programs = programs};
     return pen_renderer_create(&config, &error);
 }
 

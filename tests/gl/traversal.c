@@ -144,7 +144,7 @@ static void check_endless(GLuint program)
 
 int main(void)
 {
-    struct pen_renderer_config config = {.debug = true};
+    struct pen_device_config config = {.debug = true};
     struct pen_device_info device;
     struct pen_error error = {0};
     struct gl_context *context = gl_context_create(&config, &device, &error);

@@ -27,7 +27,7 @@ RULES = [
      FLOOR_1 + ["renderer/blob/*", "renderer/import/*"],
      ["tiny_gltf.h", "nlohmann/*", "cjson/cJSON.h", "meshoptimizer.h", "zip.h", "webp/*", "spng.h", "turbojpeg.h",
       "seccomp.h", "cglm/*", "OpenImageIO/*", "openssl/*", "libdeflate.h", "zlib.h"], "system"),
-    (r"renderer/encode/.*", FLOOR_1 + ["renderer/renderer.h", "renderer/encode/*"],
+    (r"renderer/encode/.*", FLOOR_1 + ["renderer/picture.h", "renderer/encode/*"],
      ["OpenImageIO/*", "isa-l.h", "isa-l/*", "webp/*"], "system"),
     (r"renderer/trace/.*", FLOOR_1 + ["renderer/*"], ["embree[34]/*"] + GL, "system"),
     (r"renderer/.*", FLOOR_1 + ["renderer/*"], GL, "system"),

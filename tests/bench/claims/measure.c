@@ -348,7 +348,7 @@ int main(int argc, char **argv)
             return 2;
         }
         if (c == 'd')
-            config.device = (uint32_t)device;
+            config.device.choice = (uint32_t)device;
         else
             out_folder = optarg;
     }

@@ -1,5 +1,5 @@
 /* penumbrad: settings, signals, and the life of the service. */
-#include "renderer/renderer.h"
+#include "renderer/catalogue/catalogue.h"
 #include "server/base/log.h"
 #include "server/service.h"
 #include <errno.h>
@@ -66,7 +66,7 @@ int main(int argc, char **argv)
     pthread_sigmask(SIG_BLOCK, &signals, NULL); /* before any thread, so that all inherit it */
     sigdelset(&signals, SIGUSR1);
     signal(SIGPIPE, SIG_IGN);
-    struct service *service = service_create(&config, pen_renderer_catalogue(), &error);
+    struct service *service = service_create(&config, &pen_catalogue, &error);
     if (!service) {
         fprintf(stderr, "penumbrad: %s\n", error.message);
         return EXIT_SETTINGS;

@@ -1,6 +1,8 @@
 #include "server/base/config.h"
 #include "protocol/json_suggest.h"
-#include "renderer/renderer.h"
+#include "protocol/limits.h"
+#include "protocol/param.h"
+#include "renderer/device.h"
 #include <ctype.h>
 #include <errno.h>
 #include <stdio.h>

@@ -33,6 +33,7 @@ RULES = [
     (r"renderer/.*", FLOOR_1 + ["renderer/*"], GL, "system"),
     (r"server/.*",
      ["protocol/*", "server/*", "renderer/renderer.h", "renderer/encode/encode.h",
+      "renderer/catalogue/catalogue.h", "renderer/device.h", "renderer/picture.h",
       "renderer/blob/pscene.h", "renderer/blob/builder.h", "renderer/import/import_process.h",
       "renderer/import/bundle.h", "renderer/generate/generate.h", "renderer/metrics/*.h",
       "renderer/trace/*.h"],

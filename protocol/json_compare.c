@@ -246,7 +246,7 @@ char *pen_compare_json(const struct pen_compare *compare, const struct pen_compa
         pen_json_string(&json, "request_id", request_id);
     pen_json_id(&json, "scene", first->completed.scene);
     pen_request_write(&json, "request", &first->completed, catalogue);
-    pen_result_write_device(&json, &first->device);
+    pen_result_write_device(&json, "device", &first->device);
     pen_json_array(&json, "warnings");
     if (*compare->warning)
         pen_json_string(&json, NULL, compare->warning);

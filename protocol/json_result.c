@@ -14,9 +14,10 @@ static uint32_t least(uint32_t a, uint32_t b)
     return a < b ? a : b;
 }
 
-void pen_result_write_device(struct pen_json *json, const struct pen_device_info *device)
+void pen_result_write_device(
+    struct pen_json *json, const char *key, const struct pen_device_info *device)
 {
-    pen_json_object(json, "device");
+    pen_json_object(json, key);
     pen_json_string(json, "renderer", device->renderer);
     pen_json_string(json, "version", device->version);
     pen_json_string(json, "platform", device->platform);
@@ -76,7 +77,7 @@ char *pen_result_json(const struct pen_result *result, const struct pen_record_e
     pen_json_end(&json);
     if (extra->choice)
         pen_json_string(&json, "choice", extra->choice);
-    pen_result_write_device(&json, &result->device);
+    pen_result_write_device(&json, "device", &result->device);
     pen_json_object(&json, "cache");
     pen_json_bool(&json, "result", extra->from_cache);
     pen_json_bool(&json, "scene_resident", result->scene_was_resident);

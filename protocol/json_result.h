@@ -31,8 +31,9 @@ struct pen_record_extra {
 char *pen_result_json(const struct pen_result *result, const struct pen_record_extra *extra,
     const struct pen_catalogue *catalogue);
 
-/* Parts of it: "device", and "stages_ms" with "passes". */
-void pen_result_write_device(struct pen_json *json, const struct pen_device_info *device);
+/* Parts of it: the device, and "stages_ms" with "passes". */
+void pen_result_write_device(
+    struct pen_json *json, const char *key, const struct pen_device_info *device);
 void pen_result_write_times(struct pen_json *json, const struct pen_result *result);
 
 /* The Server-Timing header's value, "queue;dur=0.1, load;dur=0, ..."; at most `bytes`

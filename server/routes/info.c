@@ -91,7 +91,7 @@ bool route_service(struct call *call, struct pen_error *error)
     pen_json_string(&json, "build", picture_build());
     pen_json_double(&json, "uptime_s", clock_ms(clock_now_ns() - s->started_ns) / 1e3);
     if (pool.has_device)
-        pen_result_write_device(&json, &pool.device);
+        pen_result_write_device(&json, "device", &pool.device);
     else
         pen_json_null(&json, "device");
     pen_json_object(&json, "workers");

@@ -19,6 +19,7 @@ libspng-dev
 libssl-dev
 libtinygltf-dev
 libturbojpeg0-dev
+libutf8proc-dev
 libwebp-dev
 libzip-dev
 zlib1g-dev

@@ -199,6 +199,12 @@ static void write_parameters(
             "{\"name\":\"after\",\"in\":\"query\",\"description\":\"The last "
             "id of the page before.\",\"schema\":{\"$ref\":\"" SCHEMA "Id\"}}");
     }
+    if (route->flags & PEN_ROUTE_ENTRY)
+        pen_json_raw(json, NULL,
+            "{\"name\":\"entry\",\"in\":\"query\",\"description\":\"The .glb or .gltf that is "
+            "wanted, where a zip or a form holds several. The id is then the SHA-256 of "
+            "PENENTR1, the entry's length in 4 bytes from the lowest, 4 zero bytes, the entry "
+            "and the upload's own bytes.\",\"schema\":{\"type\":\"string\"}}");
     if (route->flags & PEN_ROUTE_QUERY)
         write_request_queries(json, catalogue);
     pen_json_end(json);

@@ -2,6 +2,7 @@
 #include "protocol/request.h"
 #include <stdio.h>
 #include <string.h>
+#include <strings.h>
 
 const struct pen_route pen_routes[PEN_ROUTES] = {
 #define ENDPOINT(id_, ...) [PEN_ROUTE_##id_] = {.id = PEN_ROUTE_##id_, __VA_ARGS__},
@@ -52,17 +53,35 @@ static bool fits(const char *pattern, const char *path, struct pen_route_match *
     return !*pattern && !*path;
 }
 
+/* What stands behind the pattern of a PEN_ROUTE_NAMED row. */
+static bool is_file_name(const char *path)
+{
+    static const char *const endings[] = {".glb", ".gltf", ".zip"};
+    size_t bytes = strlen(path);
+    for (size_t i = 0; i < sizeof endings / sizeof *endings; i++) {
+        size_t tail = strlen(endings[i]);
+        if (bytes > 1 + tail && !strcasecmp(path + bytes - tail, endings[i]))
+            return path[0] == '/' && !strchr(path + 1, '/');
+    }
+    return false;
+}
+
 bool pen_route_find(const char *method, const char *path, struct pen_route_match *match)
 {
     memset(match, 0, sizeof *match);
     if (!strcmp(method, "HEAD"))
         method = "GET";
     for (uint32_t r = 0; r < PEN_ROUTES; r++) {
-        if (!fits(pen_routes[r].pattern, path, match))
+        const struct pen_route *row = &pen_routes[r];
+        size_t bytes = strlen(row->pattern);
+        bool wanted = !strcmp(row->method, method);
+        bool named = wanted && row->flags & PEN_ROUTE_NAMED &&
+                     !strncmp(path, row->pattern, bytes) && is_file_name(path + bytes);
+        if (!named && !fits(row->pattern, path, match))
             continue;
         match->methods |= 1ull << r;
-        if (!strcmp(pen_routes[r].method, method))
-            match->route = &pen_routes[r];
+        if (wanted)
+            match->route = row;
     }
     return match->route != NULL;
 }

@@ -33,6 +33,8 @@ enum pen_route_flags {
     PEN_ROUTE_PAGED = 4,       /* takes limit and after */
     PEN_ROUTE_CONDITIONAL = 8, /* ETag and If-None-Match */
     PEN_ROUTE_OPEN = 16,       /* asks for no token */
+    PEN_ROUTE_ENTRY = 32,      /* takes entry, the scene that is wanted of several */
+    PEN_ROUTE_NAMED = 64,      /* a scene file's name may follow, which says nothing more */
 };
 
 struct pen_route {

@@ -1,11 +1,12 @@
 #include "clients/cli/gltf_files.h"
-#include "protocol/hex.h"
 #include "protocol/memory.h"
 #include "protocol/request.h"
-#include "renderer/import/bundle.h"
+#include "renderer/import/names.h"
+#include <dirent.h>
 #include <openssl/evp.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 #include <sys/stat.h>
 
 static void add(struct cli_files *files, char *name, char *path, const char *type)
@@ -22,75 +23,86 @@ static bool has(const struct cli_files *files, const char *name)
     return false;
 }
 
-/* Percent-decodes a URI reference; NULL when it holds a NUL. */
-static char *decode(const char *uri)
-{
-    char *name = cli_format("%s", uri), *out = name;
-    for (const char *in = uri; *in; in++) {
-        int high = *in == '%' ? pen_hex_digit(in[1]) : -1;
-        int low = high >= 0 ? pen_hex_digit(in[2]) : -1;
-        *out++ = low >= 0 ? (char)(high * 16 + low) : *in;
-        in += low >= 0 ? 2 : 0;
-    }
-    *out = 0;
-    if (strlen(name) == (size_t)(out - name))
-        return name;
-    free(name);
-    return NULL;
-}
+/* ---- what lies in the .gltf's folder ---- */
 
-/* The file name that a URI reference stands for, without "." parts; NULL when it is not a plain
- * name below the folder. */
-static char *name_of_uri(const char *uri)
-{
-    char *name = decode(uri), *out = name;
-    for (const char *in = name; in;) {
-        size_t bytes = strcspn(in, "/");
-        bool last = !in[bytes], dot = bytes == 1 && in[0] == '.';
-        bool up = bytes == 2 && in[0] == '.' && in[1] == '.';
-        if (!bytes || up || (dot && last) || memchr(in, '\\', bytes))
-            goto fail; /* no bytes: "/x", "a//b", "a/" and "https://..." */
-        const char *next = last ? NULL : in + bytes + 1;
-        if (!dot) {
-            memmove(out, in, bytes + !last);
-            out += bytes + !last;
-        }
-        in = next;
-    }
-    if (!name)
-        return NULL;
-    *out = 0;
-    if (strlen(name) <= PEN_BUNDLE_MAX_NAME)
-        return name;
-fail:
-    free(name);
-    return NULL;
-}
+#define MAX_LISTED 65536
+#define MAX_DEPTH 8
 
-/* Adds the files that `array`'s members name with "uri". */
-static int add_uris(
-    struct cli_files *files, const cJSON *root, const char *array, const char *gltf_path)
+struct listing {
+    const char *folder; /* "" or with a slash at its end */
+    char **paths;       /* below the folder, as on disk */
+    const char **names; /* the same as an upload has them */
+    uint32_t count;
+    size_t capacity, name_capacity;
+    struct pen_names index;
+};
+
+static void list_folder(struct listing *listing, const char *below, int depth)
 {
-    const char *slash = strrchr(gltf_path, '/');
-    int folder_bytes = slash ? (int)(slash - gltf_path) + 1 : 0;
-    const cJSON *items = cJSON_GetObjectItemCaseSensitive(root, array);
-    for (const cJSON *item = items ? items->child : NULL; item; item = item->next) {
-        const cJSON *uri = cJSON_GetObjectItemCaseSensitive(item, "uri");
-        if (!cJSON_IsString(uri) || !strncmp(uri->valuestring, "data:", 5))
+    char *path = cli_format("%s%s", listing->folder, below);
+    DIR *folder = opendir(path[0] ? path : ".");
+    free(path);
+    for (struct dirent *item; folder && (item = readdir(folder)) && listing->count < MAX_LISTED;) {
+        struct stat info;
+        char tidy[PEN_BUNDLE_MAX_NAME + 1];
+        if (!strcmp(item->d_name, ".") || !strcmp(item->d_name, ".."))
             continue;
-        char *name = name_of_uri(uri->valuestring);
-        if (!name)
-            return cli_fail(CLI_FAILED, "%s names a file outside its folder: %.100s", gltf_path,
-                uri->valuestring);
-        if (has(files, name)) {
+        char *name = cli_format("%s%s", below, item->d_name);
+        char *whole = cli_format("%s%s", listing->folder, name);
+        bool known = !lstat(whole, &info);
+        if (known && S_ISLNK(info.st_mode))
+            known = !stat(whole, &info) && !S_ISDIR(info.st_mode); /* no way round in circles */
+        free(whole);
+        if (known && S_ISDIR(info.st_mode) && depth < MAX_DEPTH) {
+            char *deeper = cli_format("%s/", name);
+            list_folder(listing, deeper, depth + 1);
+            free(deeper);
+        }
+        if (!known || !S_ISREG(info.st_mode) || !pen_name_tidy(name, strlen(name), tidy)) {
             free(name);
             continue;
         }
-        char *path = cli_format("%.*s%s", folder_bytes, gltf_path, name);
-        struct stat info;
-        add(files, name, path, "application/octet-stream");
-        if (stat(path, &info) || !S_ISREG(info.st_mode))
-            return cli_fail(CLI_FAILED, "%s names %s, which is not there.", gltf_path, path);
+        listing->paths = pen_grow(
+            listing->paths, &listing->capacity, listing->count + 1, sizeof *listing->paths);
+        listing->names = pen_grow(
+            listing->names, &listing->name_capacity, listing->count + 1, sizeof *listing->names);
+        listing->names[listing->count] = cli_format("%s", tidy);
+        listing->paths[listing->count++] = name;
+    }
+    if (folder)
+        closedir(folder);
+}
+
+static void finish_listing(struct listing *listing)
+{
+    for (uint32_t i = 0; i < listing->count; i++) {
+        free(listing->paths[i]);
+        free((char *)listing->names[i]);
+    }
+    free(listing->paths);
+    free(listing->names);
+    pen_names_finish(&listing->index);
+}
+
+/* Adds the files that `array`'s members name with "uri". */
+static int add_uris(struct cli_files *files, const cJSON *root, const char *array,
+    const char *gltf_path, const struct listing *listing)
+{
+    const cJSON *items = cJSON_GetObjectItemCaseSensitive(root, array);
+    for (const cJSON *item = items ? items->child : NULL; item; item = item->next) {
+        const cJSON *uri = cJSON_GetObjectItemCaseSensitive(item, "uri");
+        if (!cJSON_IsString(uri) || !strncasecmp(uri->valuestring, "data:", 5))
+            continue;
+        int64_t found = pen_names_find(&listing->index, "", uri->valuestring, false);
+        if (found < 0)
+            return cli_fail(CLI_FAILED, "%s names %.200s, %s.", gltf_path, uri->valuestring,
+                found == PEN_NAME_ELSEWHERE   ? "which is outside its folder, or no name of a file"
+                : found == PEN_NAME_AMBIGUOUS ? "and several files in its folder could be meant"
+                                              : "which is not in its folder");
+        if (has(files, listing->names[found]))
+            continue;
+        add(files, cli_format("%s", listing->names[found]),
+            cli_format("%s%s", listing->folder, listing->paths[found]), "application/octet-stream");
         if (files->count > PEN_BUNDLE_MAX_ENTRIES)
             return cli_fail(CLI_FAILED, "%s names too many files.", gltf_path);
     }
@@ -131,11 +143,22 @@ int cli_gltf_files(const char *path, struct cli_files *files)
         cJSON_Delete(root);
         return cli_fail(CLI_FAILED, "%s is not JSON.", path);
     }
-    add(files, cli_format("%s", slash ? slash + 1 : path), cli_format("%s", path),
-        "model/gltf+json");
-    int status = add_uris(files, root, "buffers", path);
+    char name[PEN_BUNDLE_MAX_NAME + 1];
+    const char *given = slash ? slash + 1 : path;
+    if (!pen_name_tidy(given, strlen(given), name)) {
+        cJSON_Delete(root);
+        return cli_fail(CLI_FAILED, "%s has a name that cannot be uploaded.", path);
+    }
+    char *folder = cli_format("%.*s", (int)(given - path), path);
+    struct listing listing = {.folder = folder};
+    list_folder(&listing, "", 0);
+    pen_names_init(&listing.index, listing.names, listing.count);
+    add(files, cli_format("%s", name), cli_format("%s", path), "model/gltf+json");
+    int status = add_uris(files, root, "buffers", path, &listing);
     if (status == CLI_OK)
-        status = add_uris(files, root, "images", path);
+        status = add_uris(files, root, "images", path, &listing);
+    finish_listing(&listing);
+    free(folder);
     cJSON_Delete(root);
     qsort(files->parts, files->count, sizeof *files->parts, by_name);
     return status;

@@ -3,8 +3,8 @@
 #include "clients/cli/http.h"
 #include "protocol/limits.h"
 
-/* Makes sure that the server has the scene and fills `id`. `scene` is a file (.glb, .zip, or a
- * .gltf, which is sent with the files it names) or already an id. `described`, when not NULL,
+/* Makes sure that the server has the scene and fills `id`. `scene` is a file (.glb, .zip,
+ * "x.zip#entry" or a .gltf, which is sent with the files it names) or already an id. `described`, when not NULL,
  * receives the server's description (free with cJSON_Delete). Returns an enum cli_exit. */
 int cli_upload_scene(
     const struct cli_server *server, const char *scene, char id[PEN_ID_HEX + 1], cJSON **described);

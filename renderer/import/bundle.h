@@ -10,3 +10,9 @@
 #define PEN_BUNDLE_MAGIC "PENBNDL1"
 #define PEN_BUNDLE_MAX_ENTRIES 4096
 #define PEN_BUNDLE_MAX_NAME 255
+
+/* One scene of several in an upload: where the client chose it with "entry", what stands above, or
+ * the zip, has this in front, so that the id tells which one it is.
+ *
+ *   char magic[8] = "PENENTR1"; uint32_t name_bytes; uint32_t reserved = 0; name */
+#define PEN_ENTRY_MAGIC "PENENTR1"

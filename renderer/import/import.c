@@ -1,4 +1,5 @@
 #include "renderer/import/import.h"
+#include "renderer/import/base/text.h"
 #include "renderer/import/bundle.h"
 #include "renderer/import/convert/context.h"
 #include "renderer/import/image/image.h"
@@ -22,13 +23,19 @@ static bool import_document(struct psc_builder *builder, struct imp_bytes data,
     return done;
 }
 
-static bool import_files(
-    struct psc_builder *builder, struct imp_files *files, struct pen_error *error)
+static bool import_files(struct psc_builder *builder, struct imp_files *files, const char *entry,
+    struct pen_error *error)
 {
-    const struct imp_file *file = imp_files_document(files, error);
+    bool others;
+    const struct imp_file *file = imp_files_document(files, entry, &others, error);
     struct imp_bytes data;
-    return file && imp_files_load(files, file, &data, error) &&
-           import_document(builder, data, files, file->name, error);
+    if (!file || !imp_files_load(files, file, &data, error))
+        return false;
+    if (others)
+        psc_builder_add_warning(builder,
+            "The upload holds several scenes; \"%s\" is taken, and ?entry= would take another.",
+            imp_text(file->name).s);
+    return import_document(builder, data, files, file->name, error);
 }
 
 static bool is_json(const uint8_t *data, size_t bytes)
@@ -39,24 +46,51 @@ static bool is_json(const uint8_t *data, size_t bytes)
     return i < bytes && data[i] == '{';
 }
 
+/* Cuts the choice of an entry off the front of the upload. False when it is damaged. */
+static bool take_entry(struct imp_bytes *upload, char entry[PEN_BUNDLE_MAX_NAME + 1])
+{
+    uint32_t bytes;
+    if (upload->bytes < 16)
+        return false;
+    memcpy(&bytes, upload->data + 8, 4);
+    if (!bytes || bytes > PEN_BUNDLE_MAX_NAME || bytes > upload->bytes - 16)
+        return false;
+    memcpy(entry, upload->data + 16, bytes);
+    entry[bytes] = 0;
+    *upload = (struct imp_bytes){upload->data + 16 + bytes, upload->bytes - 16 - bytes};
+    return true;
+}
+
+static bool begins(struct imp_bytes upload, const char *magic)
+{
+    size_t bytes = strlen(magic);
+    return upload.bytes >= bytes && !memcmp(upload.data, magic, bytes);
+}
+
 static bool import_scene(
     struct psc_builder *builder, const uint8_t *data, size_t bytes, struct pen_error *error)
 {
+    struct imp_bytes upload = {data, bytes};
     struct imp_files files = {0};
+    char name[PEN_BUNDLE_MAX_NAME + 1], *entry = NULL;
     bool done = false;
-    if (!bytes)
+    if (begins(upload, PEN_ENTRY_MAGIC) && !take_entry(&upload, entry = name))
+        return pen_fail(error, PEN_INVALID, "", "The upload is truncated.");
+    if (!upload.bytes)
         return pen_fail(error, PEN_INVALID, "", "The upload is empty.");
-    if (bytes >= 8 && !memcmp(data, PEN_BUNDLE_MAGIC, 8))
-        done = imp_files_open_bundle(&files, data, bytes, error) &&
-               import_files(builder, &files, error);
-    else if (bytes >= 4 && (!memcmp(data, "PK\3\4", 4) || !memcmp(data, "PK\5\6", 4)))
-        done =
-            imp_files_open_zip(&files, data, bytes, error) && import_files(builder, &files, error);
-    else if ((bytes >= 4 && !memcmp(data, "glTF", 4)) || is_json(data, bytes))
-        done = import_document(builder, (struct imp_bytes){data, bytes}, &files, "", error);
-    else
+    bool is_zip = begins(upload, "PK\3\4") || begins(upload, "PK\5\6");
+    if (begins(upload, PEN_BUNDLE_MAGIC) || is_zip)
+        done = (is_zip ? imp_files_open_zip : imp_files_open_bundle)(
+                   &files, upload.data, upload.bytes, error) &&
+               import_files(builder, &files, entry, error);
+    else if (!begins(upload, "glTF") && !is_json(upload.data, upload.bytes))
         pen_fail(error, PEN_UNKNOWN_TYPE, "",
             "The upload is neither glTF binary nor glTF JSON nor a zip of them.");
+    else if (entry)
+        pen_fail(error, PEN_INVALID, "/entry",
+            "entry chooses among the files of an upload; this one is a single file.");
+    else
+        done = import_document(builder, upload, &files, "", error);
     imp_files_finish(&files);
     return done;
 }

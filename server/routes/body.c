@@ -1,5 +1,7 @@
 #include "server/routes/body.h"
 #include "protocol/memory.h"
+#include "renderer/import/names.h"
+#include "server/http/query.h"
 #include "server/routes/routes.h"
 #include <stdlib.h>
 #include <string.h>
@@ -33,13 +35,39 @@ static bool too_long(struct pen_error *error)
         error, PEN_TOO_BIG, "", "A render request has at most %d bytes.", PEN_MAX_JSON_BYTES);
 }
 
+/* The key entry; "" when the query does not have it. */
+static bool read_entry(const struct http_exchange *x, enum pen_body takes,
+    char entry[PEN_BUNDLE_MAX_NAME + 1], struct pen_error *error)
+{
+    struct pen_query_pair pairs[HTTP_MAX_PAIRS];
+    uint32_t count;
+    char *query = x->query ? strdup(x->query) : NULL;
+    bool ok = http_split_query(query, pairs, &count, error);
+    entry[0] = 0;
+    for (uint32_t i = 0; ok && i < count; i++) {
+        const char *value = pairs[i].value ? pairs[i].value : "";
+        if (takes != PEN_BODY_SCENE_UPLOAD || strcmp(pairs[i].key, "entry"))
+            ok = pen_fail(error, PEN_INVALID, "",
+                takes == PEN_BODY_SCENE_UPLOAD ? "The upload of a scene takes only the key entry."
+                                               : "The upload of an image takes no keys.");
+        else if (!pen_name_tidy(value, strlen(value), entry))
+            ok = pen_fail(error, PEN_INVALID, "/entry", "entry must name a file of the upload.");
+    }
+    free(query);
+    return ok;
+}
+
 static bool open_upload(struct call_body *body, struct service *s, enum pen_body takes,
     const struct http_exchange *x, const char *type, struct pen_error *error)
 {
     uint64_t limit = s->config->upload_limit.bytes;
+    char entry[PEN_BUNDLE_MAX_NAME + 1];
     if (service_is_draining(s))
         return pen_fail(error, PEN_UNAVAILABLE, "", "The service is shutting down.");
-    if (!type || !is_one_of(type, pen_upload_types(takes)))
+    /* What curl sends of its own accord says nothing; the bytes will. */
+    if (!type || is_one_of(type, (const char *const[]){"application/x-www-form-urlencoded", NULL}))
+        type = "application/octet-stream";
+    if (!is_one_of(type, pen_upload_types(takes)))
         return pen_fail(error, PEN_UNKNOWN_TYPE, "",
             takes == PEN_BODY_SCENE_UPLOAD
                 ? "A scene is model/gltf-binary, model/gltf+json, application/zip or "
@@ -48,10 +76,12 @@ static bool open_upload(struct call_body *body, struct service *s, enum pen_body
     if (is_longer(x, limit))
         return pen_fail(
             error, PEN_TOO_BIG, "", "An upload has at most %llu bytes.", (unsigned long long)limit);
+    if (!read_entry(x, takes, entry, error))
+        return false;
     body->has_place = true;
     if (__atomic_add_fetch(&s->uploads, 1, __ATOMIC_ACQ_REL) > s->config->uploads)
         return pen_fail(error, PEN_UNAVAILABLE, "", "Too many uploads are under way.");
-    body->upload = upload_create(s->store, type, limit, error);
+    body->upload = upload_create(s->store, type, entry, limit, error);
     return body->upload != NULL;
 }
 

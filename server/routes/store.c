@@ -93,6 +93,11 @@ bool route_scene_put(struct call *call, struct pen_error *error)
     return upload(call, STORE_SCENES, true, error);
 }
 
+bool route_scene_send(struct call *call, struct pen_error *error)
+{
+    return upload(call, STORE_SCENES, false, error);
+}
+
 bool route_image_post(struct call *call, struct pen_error *error)
 {
     return upload(call, STORE_IMAGES, false, error);

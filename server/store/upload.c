@@ -1,6 +1,6 @@
 #include "server/store/upload.h"
 #include "protocol/memory.h"
-#include "renderer/import/bundle.h"
+#include "renderer/import/names.h"
 #include "server/base/hash.h"
 #include "server/store/multipart.h"
 #include <errno.h>
@@ -24,7 +24,8 @@ struct upload {
     int file; /* the source, or the spool */
     uint64_t bytes, written, limit;
     struct hash *hash;
-    struct multipart *multipart; /* NULL: a raw body */
+    struct multipart *multipart;         /* NULL: a raw body */
+    char entry[PEN_BUNDLE_MAX_NAME + 1]; /* "": none was chosen */
     struct part *parts;
     uint32_t part_count;
     size_t part_capacity;
@@ -47,36 +48,18 @@ static bool write_all(int fd, const void *data, size_t bytes, struct pen_error *
     return true;
 }
 
-/* Relative, '/'-separated, without "", "." and ".." parts; a leading "./" is dropped. */
-static bool is_safe_name(const char *name)
-{
-    if (!*name || strlen(name) > PEN_BUNDLE_MAX_NAME || *name == '/' || strchr(name, '\\'))
-        return false;
-    for (const char *at = name; at;) {
-        size_t n = strcspn(at, "/");
-        if (n == 0 || (n == 1 && at[0] == '.') || (n == 2 && at[0] == '.' && at[1] == '.'))
-            return false;
-        for (size_t i = 0; i < n; i++)
-            if ((unsigned char)at[i] < 0x20 || at[i] == 0x7f)
-                return false;
-        at = at[n] ? at + n + 1 : NULL;
-    }
-    return true;
-}
-
 static bool begin_part(void *context, const char *name, struct pen_error *error)
 {
     struct upload *u = context;
-    while (!strncmp(name, "./", 2))
-        name += 2;
-    if (!is_safe_name(name))
+    char tidy[PEN_BUNDLE_MAX_NAME + 1];
+    if (!pen_name_tidy(name, strlen(name), tidy))
         return pen_fail(error, PEN_INVALID, "", "A file of the upload has an invalid name.");
     if (u->part_count == PEN_BUNDLE_MAX_ENTRIES)
         return pen_fail(
             error, PEN_TOO_BIG, "", "An upload has at most %d files.", PEN_BUNDLE_MAX_ENTRIES);
     u->parts = pen_grow(u->parts, &u->part_capacity, u->part_count + 1, sizeof *u->parts);
     struct part *part = &u->parts[u->part_count++];
-    snprintf(part->name, sizeof part->name, "%s", name);
+    memcpy(part->name, tidy, sizeof part->name);
     part->offset = u->written;
     part->bytes = 0;
     return true;
@@ -90,10 +73,26 @@ static bool add_data(void *context, const void *data, size_t bytes, struct pen_e
     return write_all(u->file, data, bytes, error);
 }
 
-struct upload *upload_create(
-    struct scene_store *store, const char *content_type, uint64_t limit, struct pen_error *error)
+static bool put(struct upload *u, int to, const void *data, size_t bytes, struct pen_error *error)
+{
+    hash_add(u->hash, data, bytes);
+    return write_all(to, data, bytes, error);
+}
+
+/* What bundle.h has before an upload of which one scene was chosen. */
+static bool put_entry(struct upload *u, int to, struct pen_error *error)
+{
+    uint32_t head[2] = {(uint32_t)strlen(u->entry), 0};
+    return !head[0] ||
+           (put(u, to, PEN_ENTRY_MAGIC, 8, error) && put(u, to, head, sizeof head, error) &&
+               put(u, to, u->entry, head[0], error));
+}
+
+struct upload *upload_create(struct scene_store *store, const char *content_type, const char *entry,
+    uint64_t limit, struct pen_error *error)
 {
     struct upload *u = pen_alloc_zero(1, sizeof *u);
+    memcpy(u->entry, entry, strnlen(entry, sizeof u->entry - 1));
     u->store = store;
     u->limit = limit;
     u->file = u->staging.folder = -1;
@@ -111,6 +110,8 @@ struct upload *upload_create(
         pen_fail(error, PEN_UNAVAILABLE, "", "The store could not be written.");
         goto fail;
     }
+    if (!is_multipart && !put_entry(u, u->file, error))
+        goto fail;
     return u;
 fail:
     upload_destroy(u);
@@ -145,12 +146,6 @@ bool upload_add(struct upload *u, const void *data, size_t bytes, struct pen_err
 static int by_name(const void *a, const void *b)
 {
     return strcmp(((const struct part *)a)->name, ((const struct part *)b)->name);
-}
-
-static bool put(struct upload *u, int to, const void *data, size_t bytes, struct pen_error *error)
-{
-    hash_add(u->hash, data, bytes);
-    return write_all(to, data, bytes, error);
 }
 
 static bool put_part(struct upload *u, int to, const struct part *part, struct pen_error *error)
@@ -192,8 +187,10 @@ static bool write_bundle(struct upload *u, struct pen_error *error)
     u->hash = hash_create();
     bool alone = u->part_count == 1 && stands_alone(u->parts[0].name);
     uint32_t head[2] = {u->part_count, 0};
-    bool ok =
-        alone || (put(u, to, PEN_BUNDLE_MAGIC, 8, error) && put(u, to, head, sizeof head, error));
+    bool ok = put_entry(u, to, error);
+    ok =
+        ok &&
+        (alone || (put(u, to, PEN_BUNDLE_MAGIC, 8, error) && put(u, to, head, sizeof head, error)));
     for (uint32_t i = 0; ok && i < u->part_count; i++) {
         const struct part *part = &u->parts[i];
         uint32_t name_bytes[2] = {(uint32_t)strlen(part->name), 0};

@@ -5,10 +5,11 @@
 #include "server/store/scene_store.h"
 
 struct upload;
-/* `content_type` decides between a raw and a multipart body; `limit` is in bytes. Errors:
- * PEN_UNAVAILABLE (the store), PEN_UNKNOWN_TYPE. */
-struct upload *upload_create(
-    struct scene_store *store, const char *content_type, uint64_t limit, struct pen_error *error);
+/* `content_type` decides between a raw and a multipart body; `entry` names the scene that is wanted
+ * of several, "" when none does; `limit` is in bytes. Errors: PEN_UNAVAILABLE (the store),
+ * PEN_UNKNOWN_TYPE. */
+struct upload *upload_create(struct scene_store *store, const char *content_type, const char *entry,
+    uint64_t limit, struct pen_error *error);
 /* Removes what is left of it. */
 void upload_destroy(struct upload *upload);
 /* Errors: PEN_TOO_BIG, PEN_MALFORMED, PEN_UNAVAILABLE when the disk is full. */

@@ -15,6 +15,7 @@ import sys
 import tempfile
 import threading
 import unittest
+import urllib.parse
 
 PROGRAM = ""
 PNG = b"\x89PNG\r\n\x1a\nnot really"
@@ -91,7 +92,10 @@ class Handler(http.server.BaseHTTPRequestHandler):
             stored[identity] = body
             self.answer(201, {"id": identity, "warnings": ["a warning"]})
         elif self.command == "PUT":
-            if hashlib.sha256(body).hexdigest() != rest:
+            rest, _, query = rest.partition("?")
+            entry = urllib.parse.unquote(query.removeprefix("entry=")).encode()
+            head = b"PENENTR1" + struct.pack("<II", len(entry), 0) + entry if entry else b""
+            if hashlib.sha256(head + body).hexdigest() != rest:
                 self.problem(422, "Unprocessable Content", "The bytes hash to something else.")
                 return
             stored[rest] = body
@@ -284,17 +288,53 @@ class Cli(unittest.TestCase):
         self.assertEqual(self.seen(), [("GET", "/v1/scenes/" + identity),
                                        ("POST", "/v1/scenes/%s/render" % identity)])
 
+    def test_gltf_that_spells_otherwise(self):
+        """What goes up has the names on disk; the server takes the URIs as the client does."""
+        (self.folder / "Tex").mkdir()
+        for name in ("Tex/Wood.PNG", "Scho\u0308n.png", "a#b.png", "q.bin"):
+            (self.folder / name).write_bytes(name.encode())
+        for uri, name in (("tex\\wood.png", "Tex/Wood.PNG"), ("Tex/Wood.PNG?v=3", "Tex/Wood.PNG"),
+                          ("Sch\u00f6n.png", "Scho\u0308n.png"), ("Sch%C3%B6n.png", "Scho\u0308n.png"),
+                          ("a#b.png", "a#b.png"), ("./Tex//../q.bin#1", "q.bin")):
+            (self.folder / "m.gltf").write_text(json.dumps(
+                {"asset": {"version": "2.0"}, "buffers": [{"uri": "DATA:;base64,AA=="}],
+                 "images": [{"uri": uri}]}))
+            files = {"m.gltf": (self.folder / "m.gltf").read_bytes(), name: name.encode()}
+            bundle = b"PENBNDL1" + struct.pack("<II", len(files), 0)
+            for n in sorted(files, key=str.encode):
+                bundle += struct.pack("<IIQ", len(n.encode()), 0, len(files[n])) + n.encode()
+                bundle += files[n]
+            self.stub.calls.clear()
+            self.run_cli("scenes", "upload", "m.gltf")
+            self.assertEqual(self.seen()[0],
+                             ("GET", "/v1/scenes/" + hashlib.sha256(bundle).hexdigest()), uri)
+
+    def test_entry_of_a_zip(self):
+        data = b"PK\3\4 whatever"
+        (self.folder / "s.zip").write_bytes(data)
+        entry = "glTF/m \u00e9.gltf".encode()
+        identity = hashlib.sha256(b"PENENTR1" + struct.pack("<II", len(entry), 0) + entry + data)
+        self.run_cli("scenes", "upload", "s.zip#glTF\\m \u00e9.gltf")
+        self.assertEqual(self.seen()[0], ("GET", "/v1/scenes/" + identity.hexdigest()))
+        method, path = self.seen()[1]
+        self.assertEqual(urllib.parse.unquote(path), "/v1/scenes/%s?entry=%s" % (
+            identity.hexdigest(), entry.decode()))
+        self.assertEqual((method, self.stub.calls[-1][3]), ("PUT", data))
+        self.run_cli("scenes", "upload", "s.zip#../m.gltf", status=2)
+
     def test_gltf_that_reaches_outside(self):
         (self.folder / "in/a").mkdir(parents=True)
         for name in ("x", "in/x", "in/a/b", "in/a\\b"):
             (self.folder / name).write_bytes(b"data")
         gltf = self.folder / "in/m.gltf"
-        for uri in ("../x", self.folder / "x", "a/../../x", "a/../x", "%2e%2e/x", "http://a/b",
-                    "a//b", "", "a/", ".", "a/.", "a\\b", "x%00b", "https://127.0.0.1/x",
-                    "x" * 256):
+        for uri in ("../x", self.folder / "x", "a/../../x", "%2e%2e/x", "http://a/b", "", "a/", ".",
+                    "https://127.0.0.1/x", "..\\x", "x%00b", "x" * 256):
             gltf.write_text(json.dumps({"buffers": [{"uri": str(uri)}]}))
             done = self.run_cli("scenes", "upload", gltf, status=1)
             self.assertIn(b"outside", done.stderr)
+        for uri in ("a/.", "b"):
+            gltf.write_text(json.dumps({"buffers": [{"uri": uri}]}))
+            self.assertIn(b"not in its folder", self.run_cli("scenes", "upload", gltf, status=1).stderr)
         for text in ("", "[]", "{", '{"images": [{"uri": "missing.png"}]}',
                      '{"images": [{"uri": "a"}]}'):
             gltf.write_text(text)

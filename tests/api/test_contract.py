@@ -109,7 +109,7 @@ class Contract(unittest.TestCase):
 
     def test_wrong_method(self):
         for method, path, allow in (
-                ("POST", "/v1", "GET, HEAD"), ("DELETE", "/v1/scenes", "GET, HEAD, POST"),
+                ("POST", "/v1", "GET, HEAD"), ("DELETE", "/v1/scenes", "GET, HEAD, POST, PUT"),
                 ("PATCH", "/v1/scenes/" + self.id, "GET, HEAD, PUT, DELETE"),
                 ("PUT", "/v1/scenes/%s/render" % self.id, "GET, HEAD, POST"),
                 ("OPTIONS", "/v1", "GET, HEAD"), ("BREW", "/", "GET, HEAD")):
@@ -170,10 +170,15 @@ class Contract(unittest.TestCase):
         for name in ids:
             self.assertEqual(self.d.call("DELETE", "/v1/scenes/" + name).status, 204)
 
+    def test_curl_upload(self):
+        """No type, and either form of the address that curl -T makes."""
+        for path in ("/v1/scenes", "/v1/scenes/a%20scene.glb"):
+            answer = self.d.call("PUT", path, self.glb)
+            self.assertEqual((answer.status, answer.json()["id"]), (200, self.id))
+
     def test_uploads_that_are_refused(self):
         post = lambda body, kind: self.d.call("POST", "/v1/scenes", body, {"Content-Type": kind})
         self.problem(post(self.glb, "text/plain"), 415)
-        self.problem(self.d.call("POST", "/v1/scenes", self.glb), 415)
         self.problem(post(b"", "model/gltf-binary"), 400)
         self.assertIn(post(b"not a scene at all", "model/gltf-binary").status, (415, 422))
         self.assertIn(post(self.glb[:-20], "model/gltf-binary").status, (400, 422))

@@ -1,4 +1,5 @@
 """Uploads in every form, and files that mean harm."""
+import hashlib
 import io
 import json
 import os
@@ -98,6 +99,80 @@ class Uploads(unittest.TestCase):
             gltf_id = gltf_id or scene
             self.assertEqual(scene, gltf_id)
 
+    def test_spellings(self):
+        """The names that forms, exporters and archivers write."""
+        for uri, scene, stored in (
+                ("tex\\mesh.bin", "scene.gltf", "tex/mesh.bin"),
+                ("mesh.bin", "C:\\fakepath\\scene.gltf", "C:\\fakepath\\mesh.bin"),
+                ("mesh.bin?v=3", "scene.gltf", "mesh.bin"),
+                ("Me\u0301sh.bin", "scene.gltf", "M\u00e9sh.bin"),
+                ("MESH.bin", "scene.gltf", "mesh.BIN")):
+            gltf, binary = gltf_with_buffer(uri)
+            answer = self.post(*multipart([(scene, gltf), (stored, binary)]))
+            self.assertIn(answer.status, (200, 201), answer.body)
+            self.assertEqual((answer.json()["triangles"], answer.json()["warnings"]), (1, []), uri)
+
+    def test_entries(self):
+        """Several scenes in one upload: the answer lists them, and each has an id of its own."""
+        gltf, binary = gltf_with_buffer("../mesh.bin")
+        packed = io.BytesIO()
+        with zipfile.ZipFile(packed, "w") as z:
+            for name, data in (("mesh.bin", binary), ("a/m.gltf", gltf), ("b b/m.gltf", gltf)):
+                z.writestr(name, data)
+        body = packed.getvalue()
+        refused = self.post(body, "application/zip")
+        self.assertEqual(refused.status, 422)
+        for name in ("a/m.gltf", "b b/m.gltf", "?entry="):
+            self.assertIn(name, refused.json()["detail"])
+        ids = []
+        for name, query in (("a/m.gltf", "a/m.gltf"), ("b b/m.gltf", "b%20b%2Fm.gltf")):
+            answer = self.post(body, "application/zip", "/v1/scenes?entry=" + query)
+            self.assertEqual((answer.status, answer.json()["triangles"]), (201, 1), answer.body)
+            entry = name.encode()
+            ids.append(hashlib.sha256(b"PENENTR1" + struct.pack("<II", len(entry), 0) + entry +
+                                      body).hexdigest())
+            self.assertEqual(answer.json()["id"], ids[-1])
+            put = self.d.call("PUT", "/v1/scenes/%s?entry=%s" % (ids[-1], query), body)
+            self.assertEqual((put.status, put.json()["id"]), (200, ids[-1]))
+            self.assertEqual(self.d.render(ids[-1], SMALL).status, 200)
+        self.assertNotEqual(ids[0], ids[1])
+        form = self.post(*multipart([("a/m.gltf", gltf), ("b/m.gltf", gltf), ("mesh.bin", binary)]))
+        self.assertEqual(form.status, 422)
+        body, kind = multipart([("a/m.gltf", gltf), ("b/m.gltf", gltf), ("mesh.bin", binary)])
+        self.assertEqual(self.post(body, kind, "/v1/scenes?entry=b/m.gltf").status, 201)
+        for query in ("entry=c.gltf", "entry=", "entry=../a/m.gltf", "entry=mesh.bin", "other=1",
+                      "entry=" + "x" * 300):
+            answer = self.post(body, kind, "/v1/scenes?" + query)
+            self.assertEqual(answer.status, 422, query)
+        self.assertEqual(self.post(png(2, 2), "image/png", "/v1/images?entry=a").status, 422)
+        self.assertEqual(self.post(grid_scene(2, "alone"), "model/gltf-binary",
+                                   "/v1/scenes?entry=a.glb").status, 422)
+
+    def test_bytes_say_what_they_are(self):
+        """curl sends no type with -T, and a form's with --data-binary."""
+        glb, (gltf, _) = grid_scene(3, "typeless"), gltf_with_buffer("data:,%00" + "%00" * 35)
+        packed = io.BytesIO()
+        with zipfile.ZipFile(packed, "w") as z:
+            z.writestr("s.gltf", gltf)
+        for body in (glb, gltf, packed.getvalue()):
+            scene = hashlib.sha256(body).hexdigest()
+            status = 201
+            for method, path, kind in (
+                    ("PUT", "/v1/scenes", None), ("PUT", "/v1/scenes/any%20name.glb", None),
+                    ("PUT", "/v1/scenes/" + scene, None), ("POST", "/v1/scenes", None),
+                    ("POST", "/v1/scenes", "application/x-www-form-urlencoded"),
+                    ("POST", "/v1/scenes", "application/octet-stream"),
+                    ("POST", "/v1/scenes", "model/gltf-binary")):
+                answer = self.d.call(method, path, body, {"Content-Type": kind} if kind else {})
+                self.assertEqual((answer.status, answer.json()["id"]), (status, scene), answer.body)
+                status = 200
+        self.assertEqual(self.d.call("PUT", "/v1/scenes", b"hello world").status, 415)
+        image = self.post(png(3, 2), "application/x-www-form-urlencoded", "/v1/images")
+        self.assertEqual(image.status, 201)
+        self.d.call("DELETE", "/v1/images/" + image.json()["id"])
+        self.assertEqual(self.post(glb, "text/html").status, 415)
+        self.assertEqual(self.d.call("GET", "/v1/scenes/any.glb").status, 404)
+
     def test_single_file_form(self):
         glb = grid_scene(2, "form")
         scene = self.post(glb, "model/gltf-binary").json()["id"]
@@ -124,7 +199,7 @@ class Uploads(unittest.TestCase):
                              (b"--8a3b--\r\n", 400), (b"\r\n" * 50000, 400)):
             answer = self.post(body, kind)
             self.assertEqual(answer.status, status, (body[:80], answer.body))
-        for name in ("../x.bin", "/etc/x", "a/../b", "a//b", "a\\\\b", "x" * 300, "a/./b"):
+        for name in ("../x.bin", "/etc/x", "a/../b", "a//b", "..\\x", "x" * 300, "a/./b", "a:b"):
             answer = self.post(*multipart([("scene.gltf", gltf), (name, b"1")]))
             self.assertIn(answer.status, (400, 422), name)
         for count, status in ((4200, 413), (9000, 400)):

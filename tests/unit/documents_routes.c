@@ -52,6 +52,14 @@ int main(void)
     CHECK_STR(allow, "GET, HEAD, PUT, DELETE");
     CHECK(!pen_route_find("DELETE", "/v1/scenes", &match) && match.methods);
     pen_route_allow(match.methods, allow, sizeof allow);
-    CHECK_STR(allow, "GET, HEAD, POST");
+    CHECK_STR(allow, "GET, HEAD, POST, PUT");
+    /* curl -T file URL/ puts the file's name behind */
+    CHECK(pen_route_find("PUT", "/v1/scenes/My scene.GLB", &match));
+    CHECK(match.route->id == PEN_ROUTE_scene_send);
+    CHECK(pen_route_find("PUT", "/v1/scenes", &match) && match.route->id == PEN_ROUTE_scene_send);
+    CHECK(!pen_route_find("GET", "/v1/scenes/a.glb", &match) && !match.methods);
+    CHECK(!pen_route_find("PUT", "/v1/scenes/.glb", &match) && !match.methods);
+    CHECK(!pen_route_find("PUT", "/v1/scenes/a.png", &match) && !match.methods);
+    CHECK(!pen_route_find("PUT", "/v1/scenes/a.glb/b", &match) && !match.methods);
     CHECK_DONE();
 }

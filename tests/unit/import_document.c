@@ -111,9 +111,13 @@ static void data_uris(void)
         size_t bytes;
     } good[] = {{"data:;base64,", "", "", 0}, {"data:image/png;base64,TQ==", "image/png", "M", 1},
         {"data:a/b;charset=x;base64,TWE=", "a/b", "Ma", 2}, {"DATA:;BASE64,TWFu", "", "Man", 3},
-        {"data:;base64,TWFuTQ", "", "ManM", 4}, {"data:;base64,-_8=", "", "\xfb\xff", 2}};
-    const char *bad[] = {"data:image/png,hello", "data:;base64", "data:;base64,T",
-        "data:;base64,T*==", "data:;base64,TW Fu", "http://x/;base64,TQ==", "", "data:,base64"};
+        {"data:;base64,TWFuTQ", "", "ManM", 4}, {"data:;base64,-_8=", "", "\xfb\xff", 2},
+        {"data:;base64,%2B%2f8%3D", "", "\xfb\xff", 2},
+        {"data:;base64,TW\r\n\tFu TQ%0A=\n=\n", "", "ManM", 4},
+        {"Data:image/PNG ; Base64 ,TQ==", "image/PNG", "M", 1},
+        {"data:a/b,he%6clo%00%2", "a/b", "hello\0%2", 8}, {"data:,", "", "", 0}};
+    const char *bad[] = {"data:;base64", "data:;base64,T",
+        "data:;base64,T*==", "data:;base64,TQ==TQ==", "http://x/;base64,TQ==", ""};
     for (size_t i = 0; i < sizeof good / sizeof *good; i++) {
         char copy[64];
         const char *mime = NULL;

@@ -130,7 +130,7 @@ static void test_uploads(void)
         0xb4, 0x10, 0xff, 0x61, 0xf2, 0x00, 0x15, 0xad}; /* FIPS 180-2, appendix B.1 */
     struct scene_store *store = scene_store_open(root, NULL);
     uint8_t id[PEN_ID_BYTES];
-    struct upload *upload = upload_create(store, "model/gltf-binary", 3, NULL);
+    struct upload *upload = upload_create(store, "model/gltf-binary", "", 3, NULL);
     CHECK(upload_add(upload, "a", 1, NULL) && upload_add(upload, "bc", 2, NULL));
     CHECK(upload_finish(upload, id, NULL));
     CHECK(!memcmp(id, abc, PEN_ID_BYTES));
@@ -138,7 +138,7 @@ static void test_uploads(void)
     upload_destroy(upload);
     CHECK(count_files("tmp") == 0);
     struct pen_error error = {0};
-    upload = upload_create(store, "model/gltf-binary", 3, NULL);
+    upload = upload_create(store, "model/gltf-binary", "", 3, NULL);
     CHECK(!upload_add(upload, "abcd", 4, &error) && error.code == PEN_TOO_BIG);
     upload_destroy(upload);
     CHECK(count_files("tmp") == 0);

@@ -7,6 +7,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 
 #define GLB_JSON 0x4e4f534au
 #define GLB_BIN 0x004e4942u
@@ -83,12 +84,11 @@ static bool parse(struct imp_document *document, struct imp_bytes json, struct p
 static bool fetch(cJSON *uri, struct imp_files *files, const char *name, const char *pointer,
     const char **mime, struct imp_bytes *found, struct pen_error *error)
 {
-    if (strncmp(uri->valuestring, "data:", 5))
+    if (strncasecmp(uri->valuestring, "data:", 5))
         return imp_files_resolve(files, name, uri->valuestring, pointer, found, error);
     if (imp_data_uri_decode(uri->valuestring, mime, found))
         return true;
-    return pen_fail(
-        error, PEN_INVALID, pointer, "glTF %s: the data URI is damaged or not base64.", pointer);
+    return pen_fail(error, PEN_INVALID, pointer, "glTF %s: the data URI is damaged.", pointer);
 }
 
 static bool open_buffers(struct imp_document *document, struct imp_bytes bin,

@@ -51,6 +51,6 @@ bool imp_document_unpack_views(struct imp_document *document, struct pen_error *
 bool imp_extensions_check(
     const struct cJSON *root, struct psc_builder *builder, struct pen_error *error);
 
-/* data_uri.c: decodes the base64 payload of "data:<mime>;base64,<payload>" in place; *mime is the
+/* data_uri.c: decodes the payload of "data:<mime>;base64,<payload>" in place; *mime is the
  * part before ';', cut out of `uri` in place. False when `uri` is something else or damaged. */
 bool imp_data_uri_decode(char *uri, const char **mime, struct imp_bytes *payload);

@@ -1,41 +1,18 @@
 #include "renderer/import/files/files.h"
-#include "protocol/hex.h"
 #include "protocol/memory.h"
 #include "renderer/import/base/budget.h"
-#include "renderer/import/bundle.h"
 #include "renderer/import/base/text.h"
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 #include <zip.h>
 
-bool imp_name_is_safe(const char *name, size_t bytes)
+/* A copy of the tidy name; NULL when it cannot be used. */
+static char *copy_name(const char *given, size_t bytes)
 {
-    if (!bytes || bytes > PEN_BUNDLE_MAX_NAME)
-        return false;
-    size_t part = 0; /* length of the part so far */
-    for (size_t i = 0; i <= bytes; i++) {
-        unsigned char c = i < bytes ? (unsigned char)name[i] : '/';
-        if (c < 0x20 || c == 0x7f || c == '\\' || c == ':')
-            return false;
-        if (c != '/') {
-            part++;
-            continue;
-        }
-        const char *start = name + i - part;
-        if (!part || (part == 1 && start[0] == '.') ||
-            (part == 2 && start[0] == '.' && start[1] == '.'))
-            return false;
-        part = 0;
-    }
-    return true;
-}
-
-static char *copy_name(const char *name, size_t bytes)
-{
-    char *copy = pen_alloc_zero(bytes + 1, 1);
-    memcpy(copy, name, bytes);
-    return copy;
+    char name[PEN_BUNDLE_MAX_NAME + 1];
+    return pen_name_tidy(given, bytes, name) ? strdup(name) : NULL;
 }
 
 static int by_name(const void *a, const void *b)
@@ -43,13 +20,19 @@ static int by_name(const void *a, const void *b)
     return strcmp(((const struct imp_file *)a)->name, ((const struct imp_file *)b)->name);
 }
 
-static bool sort_unique(struct imp_files *files, struct pen_error *error)
+/* Once all names are known. */
+static bool index_names(struct imp_files *files, struct pen_error *error)
 {
     qsort(files->items, files->count, sizeof *files->items, by_name);
     for (uint32_t i = 1; i < files->count; i++)
         if (!strcmp(files->items[i - 1].name, files->items[i].name))
             return pen_fail(error, PEN_INVALID, "", "The upload holds \"%s\" twice.",
                 imp_text(files->items[i].name).s);
+    const char **names = pen_alloc_zero(files->count, sizeof *names);
+    for (uint32_t i = 0; i < files->count; i++)
+        names[i] = files->items[i].name;
+    pen_names_init(&files->names, names, files->count);
+    free(names);
     return true;
 }
 
@@ -75,17 +58,17 @@ static bool bundle_table(
         at += 16;
         if (name_bytes > bytes - at || data_bytes > bytes - at - name_bytes)
             return pen_fail(error, PEN_INVALID, "", "The bundle is truncated.");
-        const char *name = (const char *)data + at;
-        if (!imp_name_is_safe(name, name_bytes))
+        char *name = copy_name((const char *)data + at, name_bytes);
+        if (!name)
             return pen_fail(error, PEN_INVALID, "", "File %u has an unusable name.", i);
         at += name_bytes;
-        files->items[files->count++] = (struct imp_file){
-            .name = copy_name(name, name_bytes), .data = data + at, .bytes = (size_t)data_bytes};
+        files->items[files->count++] =
+            (struct imp_file){.name = name, .data = data + at, .bytes = (size_t)data_bytes};
         at += (size_t)data_bytes;
     }
     if (at != bytes)
         return pen_fail(error, PEN_INVALID, "", "The bundle is longer than its table says.");
-    return sort_unique(files, error);
+    return index_names(files, error);
 }
 
 bool imp_files_open_bundle(
@@ -123,25 +106,25 @@ static bool zip_table(
             !(entry.valid & ZIP_STAT_NAME) || !(entry.valid & ZIP_STAT_SIZE))
             return pen_fail(error, PEN_INVALID, "", "The zip file is damaged.");
         size_t length = strlen(entry.name);
-        if (length && entry.name[length - 1] == '/')
+        if (length && (entry.name[length - 1] == '/' || entry.name[length - 1] == '\\'))
             continue; /* a folder */
-        if (!imp_name_is_safe(entry.name, length))
-            return pen_fail(error, PEN_INVALID, "", "Entry %lld of the zip has an unusable name.",
-                (long long)i);
         if ((entry.valid & ZIP_STAT_ENCRYPTION_METHOD) && entry.encryption_method != ZIP_EM_NONE)
             return pen_fail(error, PEN_INVALID, "", "The zip file is encrypted.");
         if (entry.size > IMP_MAX_ZIP_BYTES - unpacked)
             return pen_fail(error, PEN_TOO_BIG, "", "The zip file unpacks to more than %llu bytes.",
                 IMP_MAX_ZIP_BYTES);
         unpacked += entry.size;
-        files->items[files->count++] = (struct imp_file){.name = copy_name(entry.name, length),
-            .bytes = (size_t)entry.size,
-            .zip_entry = (uint64_t)i};
+        char *name = copy_name(entry.name, length);
+        if (!name)
+            return pen_fail(error, PEN_INVALID, "", "Entry %lld of the zip has an unusable name.",
+                (long long)i);
+        files->items[files->count++] =
+            (struct imp_file){.name = name, .bytes = (size_t)entry.size, .zip_entry = (uint64_t)i};
     }
     if (unpacked > IMP_ZIP_RATIO_FROM_BYTES && unpacked / IMP_MAX_ZIP_RATIO > bytes)
         return pen_fail(
             error, PEN_TOO_BIG, "", "The zip file is packed more than %d to 1.", IMP_MAX_ZIP_RATIO);
-    return sort_unique(files, error);
+    return index_names(files, error);
 }
 
 bool imp_files_open_zip(
@@ -161,6 +144,7 @@ void imp_files_finish(struct imp_files *files)
         free(files->items[i].owned);
     }
     free(files->items);
+    pen_names_finish(&files->names);
     if (files->zip)
         zip_discard(files->zip);
     memset(files, 0, sizeof *files);
@@ -178,33 +162,85 @@ static bool has_suffix(const char *name, const char *suffix)
     return n > s && !strcasecmp(name + n - s, suffix);
 }
 
-const struct imp_file *imp_files_document(struct imp_files *files, struct pen_error *error)
+static bool is_scene(const struct imp_file *file)
 {
-    const struct imp_file *best = NULL, *rival = NULL;
-    int best_depth = 0;
+    return (has_suffix(file->name, ".gltf") || has_suffix(file->name, ".glb")) &&
+           strncmp(file->name, "__MACOSX/", 9) &&
+           last_part(file->name)[0] != '.'; /* what archivers leave behind */
+}
+
+static uint32_t depth_of(const char *name)
+{
+    uint32_t depth = 0;
+    for (; *name; name++)
+        depth += *name == '/';
+    return depth;
+}
+
+/* Those of the scenes that lie at `depth`, or all of them, as text. */
+static void list_scenes(
+    const struct imp_files *files, uint32_t depth, bool all, char *list, size_t room)
+{
+    size_t at = 0;
+    uint32_t left = 0;
+    list[0] = 0;
     for (uint32_t i = 0; i < files->count; i++) {
         const struct imp_file *file = &files->items[i];
-        if (!has_suffix(file->name, ".gltf") && !has_suffix(file->name, ".glb"))
+        if (!is_scene(file) || (!all && depth_of(file->name) != depth))
             continue;
-        if (!strncmp(file->name, "__MACOSX/", 9) || last_part(file->name)[0] == '.')
-            continue; /* what archivers leave behind */
-        int depth = 0;
-        for (const char *c = file->name; *c; c++)
-            depth += *c == '/';
-        if (best && depth >= best_depth) {
-            rival = depth == best_depth ? file : rival;
-            continue;
-        }
-        best = file;
-        best_depth = depth;
-        rival = NULL;
+        struct imp_text name = imp_text(file->name);
+        if (at + strlen(name.s) + 32 > room)
+            left++;
+        else
+            at += (size_t)snprintf(list + at, room - at, "%s\"%s\"", at ? ", " : "", name.s);
     }
+    if (left)
+        snprintf(list + at, room - at, " and %u more", left);
+}
+
+static const struct imp_file *named_document(
+    struct imp_files *files, const char *entry, struct pen_error *error)
+{
+    char list[400];
+    int64_t number = pen_names_find(&files->names, "", entry, false);
+    if (number >= 0 && is_scene(&files->items[number]))
+        return &files->items[number];
+    list_scenes(files, 0, true, list, sizeof list);
+    pen_fail(error, PEN_INVALID, "/entry", "entry must name one scene of the upload: %s.", list);
+    return NULL;
+}
+
+const struct imp_file *imp_files_document(
+    struct imp_files *files, const char *entry, bool *others, struct pen_error *error)
+{
+    const struct imp_file *best = NULL;
+    uint32_t best_depth = 0, count = 0, level = 0;
+    *others = false;
+    if (entry)
+        return named_document(files, entry, error);
+    for (uint32_t i = 0; i < files->count; i++) {
+        const struct imp_file *file = &files->items[i];
+        uint32_t depth = depth_of(file->name);
+        if (!is_scene(file))
+            continue;
+        count++;
+        if (!best || depth < best_depth) {
+            best = file;
+            best_depth = depth;
+            level = 0;
+        }
+        level += depth == best_depth;
+    }
+    char list[400];
+    *others = count > 1;
     if (!best)
         pen_fail(error, PEN_INVALID, "", "There is no .glb or .gltf among the files.");
-    else if (rival)
-        pen_fail(error, PEN_INVALID, "", "Both \"%s\" and \"%s\" could be the scene; upload one.",
-            imp_text(best->name).s, imp_text(rival->name).s);
-    return rival ? NULL : best;
+    if (level < 2)
+        return best;
+    list_scenes(files, best_depth, false, list, sizeof list);
+    pen_fail(error, PEN_INVALID, "/entry",
+        "The upload holds several scenes; ?entry= says which to take: %s.", list);
+    return NULL;
 }
 
 static bool unpack(struct imp_files *files, struct imp_file *file, struct pen_error *error)
@@ -238,82 +274,17 @@ bool imp_files_load(struct imp_files *files, const struct imp_file *file, struct
     return true;
 }
 
-/* Joins base's folder and the decoded uri, and folds "." and "..", into `name`. False when the
- * result is no safe name. */
-static bool join(const char *base, const char *uri, char name[PEN_BUNDLE_MAX_NAME + 1])
-{
-    char joined[2 * PEN_BUNDLE_MAX_NAME + 2];
-    size_t n = (size_t)(last_part(base) - base);
-    if (n > PEN_BUNDLE_MAX_NAME)
-        return false;
-    memcpy(joined, base, n);
-    for (const char *c = uri; *c; c++) {
-        if (n >= sizeof joined - 1)
-            return false;
-        int high = c[0] == '%' ? pen_hex_digit(c[1]) : -1;
-        int low = high >= 0 ? pen_hex_digit(c[2]) : -1;
-        joined[n++] = low >= 0 ? (char)(high << 4 | low) : *c;
-        c += low >= 0 ? 2 : 0;
-        if (!joined[n - 1])
-            return false;
-    }
-    joined[n] = 0;
-    size_t out = 0;
-    for (char *part = joined, *next; part; part = next) {
-        char *slash = strchr(part, '/');
-        next = slash ? slash + 1 : NULL;
-        size_t length = slash ? (size_t)(slash - part) : strlen(part);
-        if (length == 1 && part[0] == '.')
-            continue;
-        if (length == 2 && part[0] == '.' && part[1] == '.') {
-            if (!out)
-                return false; /* above the upload's root */
-            while (out && name[--out] != '/')
-                ;
-            continue;
-        }
-        if (out + length + 1 > PEN_BUNDLE_MAX_NAME)
-            return false;
-        if (out)
-            name[out++] = '/';
-        memcpy(name + out, part, length);
-        out += length;
-    }
-    name[out] = 0;
-    return imp_name_is_safe(name, out);
-}
-
-static const struct imp_file *find(const struct imp_files *files, char *name)
-{
-    struct imp_file key = {.name = name};
-    const struct imp_file *file =
-        files->count ? bsearch(&key, files->items, files->count, sizeof key, by_name) : NULL;
-    if (file)
-        return file;
-    const struct imp_file *only = NULL;
-    for (uint32_t i = 0; i < files->count; i++) {
-        if (strcmp(last_part(files->items[i].name), last_part(name)))
-            continue;
-        if (only)
-            return NULL;
-        only = &files->items[i];
-    }
-    return only;
-}
-
 bool imp_files_resolve(struct imp_files *files, const char *base, const char *uri,
     const char *pointer, struct imp_bytes *found, struct pen_error *error)
 {
-    char name[PEN_BUNDLE_MAX_NAME + 1];
-    const char *colon = strchr(uri, ':'), *slash = strchr(uri, '/');
-    if (uri[0] == '/' || uri[0] == '\\' || (colon && (!slash || colon < slash)) ||
-        !join(base, uri, name))
-        return pen_fail(error, PEN_INVALID, pointer,
-            "The glTF refers to \"%s\": only uploaded files, by relative names, can be used.",
-            imp_text(uri).s);
-    const struct imp_file *file = find(files, name);
-    if (!file)
-        return pen_fail(error, PEN_INVALID, pointer,
-            "The glTF refers to \"%s\", which was not uploaded with it.", imp_text(uri).s);
-    return imp_files_load(files, file, found, error);
+    int64_t number = pen_names_find(&files->names, base, uri, true);
+    if (number >= 0)
+        return imp_files_load(files, &files->items[number], found, error);
+    const char *why = number == PEN_NAME_ELSEWHERE ? ": only files that are uploaded with it, by "
+                                                     "relative names, can be used"
+                      : number == PEN_NAME_AMBIGUOUS
+                          ? ", and several of the uploaded files could be meant"
+                          : ", which was not uploaded with it";
+    return pen_fail(
+        error, PEN_INVALID, pointer, "The glTF refers to \"%s\"%s.", imp_text(uri).s, why);
 }

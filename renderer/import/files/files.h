@@ -2,6 +2,7 @@
  * nothing else; no name ever reaches the file system. */
 #pragma once
 #include "protocol/error.h"
+#include "renderer/import/names.h"
 #include <stddef.h>
 
 struct imp_bytes {
@@ -22,6 +23,7 @@ struct imp_file {
 struct imp_files {
     struct imp_file *items;
     uint32_t count;
+    struct pen_names names; /* of the items */
     struct zip *zip;
 };
 
@@ -33,19 +35,14 @@ bool imp_files_open_zip(
     struct imp_files *files, const uint8_t *data, size_t bytes, struct pen_error *error);
 void imp_files_finish(struct imp_files *files);
 
-/* The .glb or .gltf to import: the one nearest to the root; PEN_INVALID when there is none,
- * or more than one there. */
-const struct imp_file *imp_files_document(struct imp_files *files, struct pen_error *error);
-/* What `uri` (percent-encoded, relative to the folder of the file called `base`) names. A file that
- * is not where the URI says is taken by its last part when that is unique, as forms often drop the
- * folders. Errors, at `pointer`: PEN_INVALID for absolute or outside URIs and files that were
- * not uploaded. */
+/* The .glb or .gltf to import: what `entry` names; when it is NULL, the one nearest to the root, and
+ * *others tells whether there are more. PEN_INVALID when there is none, or more than one there. */
+const struct imp_file *imp_files_document(
+    struct imp_files *files, const char *entry, bool *others, struct pen_error *error);
+/* The file that `uri`, relative to the folder of the file called `base`, means (pen_names_find).
+ * Errors, at `pointer`: PEN_INVALID for addresses on a network and files that were not uploaded. */
 bool imp_files_resolve(struct imp_files *files, const char *base, const char *uri,
     const char *pointer, struct imp_bytes *found, struct pen_error *error);
 /* Unpacks the file when needed. Errors: PEN_INVALID (damaged). */
 bool imp_files_load(struct imp_files *files, const struct imp_file *file, struct imp_bytes *found,
     struct pen_error *error);
-
-/* True for a relative name of '/'-separated parts, none empty, "." or "..", without control
- * characters, backslashes or a drive. */
-bool imp_name_is_safe(const char *name, size_t bytes);

@@ -1,0 +1,233 @@
+#include "renderer/import/names.h"
+#include "protocol/hex.h"
+#include "protocol/memory.h"
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+#include <utf8proc.h>
+
+#define FAKE_PATH "C:/fakepath/"
+#define VARIANTS 4
+
+bool pen_name_is_safe(const char *name, size_t bytes)
+{
+    if (!bytes || bytes > PEN_BUNDLE_MAX_NAME)
+        return false;
+    size_t part = 0; /* length of the part so far */
+    for (size_t i = 0; i <= bytes; i++) {
+        unsigned char c = i < bytes ? (unsigned char)name[i] : '/';
+        if (c < 0x20 || c == 0x7f || c == '\\' || c == ':')
+            return false;
+        if (c != '/') {
+            part++;
+            continue;
+        }
+        const char *start = name + i - part;
+        if (!part || (part == 1 && start[0] == '.') ||
+            (part == 2 && start[0] == '.' && start[1] == '.'))
+            return false;
+        part = 0;
+    }
+    return true;
+}
+
+static bool is_letter(char c)
+{
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z');
+}
+
+static void turn_slashes(char *name)
+{
+    for (; (name = strchr(name, '\\')); name++)
+        *name = '/';
+}
+
+bool pen_name_tidy(const char *given, size_t bytes, char name[PEN_BUNDLE_MAX_NAME + 1])
+{
+    char whole[2 * PEN_BUNDLE_MAX_NAME + 1];
+    if (bytes >= sizeof whole || memchr(given, 0, bytes))
+        return false;
+    memcpy(whole, given, bytes);
+    whole[bytes] = 0;
+    turn_slashes(whole);
+    const char *from = whole;
+    if (!strncasecmp(from, FAKE_PATH, strlen(FAKE_PATH)))
+        from += strlen(FAKE_PATH);
+    else if (is_letter(from[0]) && from[1] == ':' && from[2] == '/')
+        from += 3;
+    while (from[0] == '.' && from[1] == '/')
+        from += 2;
+    size_t left = strlen(from);
+    if (!pen_name_is_safe(from, left))
+        return false;
+    memcpy(name, from, left + 1);
+    return true;
+}
+
+/* ---- names that are the same to people ---- */
+
+struct pen_name_keys {
+    const char *name;
+    char *composed, *folded; /* normal form C, and that without regard to case */
+};
+
+/* The name itself where it is not UTF-8. */
+static char *map(const char *name, utf8proc_option_t options)
+{
+    utf8proc_uint8_t *mapped = NULL;
+    if (utf8proc_map((const utf8proc_uint8_t *)name, 0, &mapped,
+            UTF8PROC_NULLTERM | UTF8PROC_STABLE | UTF8PROC_COMPOSE | options) >= 0)
+        return (char *)mapped;
+    size_t bytes = strlen(name) + 1;
+    return memcpy(pen_alloc_zero(bytes, 1), name, bytes);
+}
+
+void pen_names_init(struct pen_names *index, const char *const *names, uint32_t count)
+{
+    index->count = count;
+    index->keys = pen_alloc_zero(count, sizeof *index->keys);
+    for (uint32_t i = 0; i < count; i++)
+        index->keys[i] =
+            (struct pen_name_keys){names[i], map(names[i], 0), map(names[i], UTF8PROC_CASEFOLD)};
+}
+
+void pen_names_finish(struct pen_names *index)
+{
+    for (uint32_t i = 0; i < index->count; i++) {
+        free(index->keys[i].composed);
+        free(index->keys[i].folded);
+    }
+    free(index->keys);
+    *index = (struct pen_names){0, NULL};
+}
+
+static const char *last_part(const char *name)
+{
+    const char *slash = strrchr(name, '/');
+    return slash ? slash + 1 : name;
+}
+
+static const char *key_of(const struct pen_name_keys *keys, int level)
+{
+    return level == 0 ? keys->name : level == 1 ? keys->composed : keys->folded;
+}
+
+/* The only name that equals `wanted`, as written, composed or folded; `part`: in the last part. */
+static int64_t look_up(const struct pen_names *index, const struct pen_name_keys *wanted, bool part)
+{
+    for (int level = 0; level < 3; level++) {
+        const char *sought = key_of(wanted, level);
+        int64_t found = PEN_NAME_UNKNOWN;
+        for (uint32_t i = 0; i < index->count; i++) {
+            const char *key = key_of(&index->keys[i], level);
+            if (!strcmp(part ? last_part(key) : key, part ? last_part(sought) : sought))
+                found = found == PEN_NAME_UNKNOWN ? (int64_t)i : PEN_NAME_AMBIGUOUS;
+        }
+        if (found != PEN_NAME_UNKNOWN)
+            return found;
+    }
+    return PEN_NAME_UNKNOWN;
+}
+
+/* ---- what a URI may mean ---- */
+
+/* Joins base's folder and the path, and folds "." and ".."; what leads above the upload's root
+ * becomes its last part, and *outside true. False when the result is no safe name. */
+static bool join(
+    const char *base, const char *path, char name[PEN_BUNDLE_MAX_NAME + 1], bool *outside)
+{
+    char joined[2 * PEN_BUNDLE_MAX_NAME + 2];
+    size_t n = *outside ? 0 : (size_t)(last_part(base) - base), length = strlen(path), out = 0;
+    if (n + length >= sizeof joined)
+        return false;
+    memcpy(joined, base, n);
+    memcpy(joined + n, path, length + 1);
+    for (char *part = joined, *next; part; part = next) {
+        char *slash = strchr(part, '/');
+        next = slash ? slash + 1 : NULL;
+        size_t bytes = slash ? (size_t)(slash - part) : strlen(part);
+        if ((bytes == 1 && part[0] == '.') || (!bytes && next))
+            continue;
+        if (bytes == 2 && part[0] == '.' && part[1] == '.') {
+            *outside = *outside || !out;
+            while (out && name[--out] != '/')
+                ;
+            continue;
+        }
+        if (out + bytes + 1 > PEN_BUNDLE_MAX_NAME)
+            return false;
+        if (out)
+            name[out++] = '/';
+        memcpy(name + out, part, bytes);
+        out += bytes;
+    }
+    name[out] = 0;
+    return pen_name_is_safe(name, out);
+}
+
+/* Copies `bytes` of the URI, decoded or as they are; false when there is a NUL. */
+static bool decode(const char *uri, size_t bytes, bool decoded, char *path)
+{
+    for (size_t i = 0; i < bytes; i++) {
+        int high = decoded && uri[i] == '%' ? pen_hex_digit(uri[i + 1]) : -1;
+        int low = high >= 0 ? pen_hex_digit(uri[i + 2]) : -1;
+        *path = low >= 0 ? (char)(high << 4 | low) : uri[i];
+        i += low >= 0 ? 2 : 0;
+        if (!*path++)
+            return false;
+    }
+    *path = 0;
+    return true;
+}
+
+/* A URI as a path; *outside when it is an absolute one on somebody's disk. NULL when it is none. */
+static const char *path_of(char *text, bool *outside)
+{
+    turn_slashes(text);
+    if (!strncasecmp(text, "file:", 5))
+        text += 5, *outside = true;
+    if (is_letter(text[0]) && text[1] == ':')
+        text += 2, *outside = true;
+    *outside = *outside || text[0] == '/';
+    const char *colon = strchr(text, ':'), *slash = strchr(text, '/');
+    return colon && (!slash || colon < slash) ? NULL : text;
+}
+
+int64_t pen_names_find(const struct pen_names *index, const char *base, const char *uri, bool loose)
+{
+    struct pen_name_keys wanted[VARIANTS];
+    char names[VARIANTS][PEN_BUNDLE_MAX_NAME + 1];
+    bool outside[VARIANTS] = {false};
+    bool elsewhere = false; /* as it is meant to be read */
+    uint32_t count = 0;
+    size_t length = strlen(uri), cut = strcspn(uri, "?#");
+    if (length > 4 * PEN_BUNDLE_MAX_NAME)
+        return PEN_NAME_ELSEWHERE;
+    for (int v = 0; v < VARIANTS; v++) {
+        char text[4 * PEN_BUNDLE_MAX_NAME + 1];
+        bool whole = v % 2 == 0, decoded = v < 2;
+        outside[count] = false;
+        if ((!whole && cut == length) || (!decoded && !memchr(uri, '%', length)))
+            continue;
+        const char *path = NULL;
+        if (decode(uri, whole ? length : cut, decoded, text))
+            path = path_of(text, &outside[count]);
+        if (!path || !join(base, path, names[count], &outside[count]) ||
+            (outside[count] && !loose)) {
+            elsewhere = elsewhere || v == 0;
+            continue;
+        }
+        wanted[count] = (struct pen_name_keys){
+            names[count], map(names[count], 0), map(names[count], UTF8PROC_CASEFOLD)};
+        count++;
+    }
+    int64_t found = PEN_NAME_UNKNOWN;
+    for (uint32_t k = 0; k < (loose ? 2 : 1) * count && found == PEN_NAME_UNKNOWN; k++)
+        if (k >= count || !outside[k])
+            found = look_up(index, &wanted[k % count], k >= count);
+    for (uint32_t k = 0; k < count; k++) {
+        free(wanted[k].composed);
+        free(wanted[k].folded);
+    }
+    return found == PEN_NAME_UNKNOWN && elsewhere ? PEN_NAME_ELSEWHERE : found;
+}

@@ -3,7 +3,7 @@
 #include "renderer/frame/frame.h"
 #include "renderer/generate/generate.h"
 #include "renderer/gl/context.h"
-#include "renderer/passes/draw/scratch.h"
+#include "renderer/passes/draw/passes.h"
 #include "renderer/passes/map/shadow_cache.h"
 #include <stdlib.h>
 #include <string.h>
@@ -29,6 +29,7 @@ enum {
 
 struct pen_renderer {
     struct gl_context *context;
+    struct pen_device_info device;
     struct technique_ctx ctx;
     struct frame_targets targets;
     uint64_t budget, clock;
@@ -54,7 +55,7 @@ struct pen_renderer *pen_renderer_create(
     const struct pen_renderer_config *config, struct pen_error *error)
 {
     struct pen_renderer *r = pen_alloc_zero(1, sizeof *r);
-    r->context = gl_context_create(&config->device, &r->ctx.device, error);
+    r->context = gl_context_create(&config->device, &r->device, error);
     if (!r->context) {
         free(r);
         return NULL;
@@ -62,11 +63,13 @@ struct pen_renderer *pen_renderer_create(
     r->budget = config->gpu_memory_bytes ? config->gpu_memory_bytes : 1ull << 30;
     r->ctx.gpu_memory = r->budget;
     r->ctx.shadow_memory = r->budget / 2;
+    r->ctx.software = r->device.software;
+    r->ctx.passes = passes_create();
     r->ctx.programs = gl_programs_create(config->programs);
     r->ctx.shadows = shadow_cache_create();
     r->emissions = emission_cache_create();
     gl_samplers_init(&r->ctx.samplers);
-    gl_timer_init(&r->ctx.timer, r->ctx.device.software);
+    gl_timer_init(&r->ctx.timer, r->device.software);
     gl.CreateVertexArrays(1, &r->ctx.empty_array);
     gl.CreateBuffers(1, &r->ctx.light_block);
     gl.CreateBuffers(1, &r->ctx.param_block);
@@ -96,20 +99,13 @@ void pen_renderer_destroy(struct pen_renderer *r)
     for (uint32_t i = 0; i < r->scene_count; i++)
         scene_destroy(r->scenes[i]);
     frame_targets_finish(&r->targets);
+    passes_destroy(r->ctx.passes);
     shadow_cache_destroy(r->ctx.shadows);
     emission_cache_destroy(r->emissions);
     gl_timer_finish(&r->ctx.timer);
     gl_samplers_finish(&r->ctx.samplers);
     gl_programs_destroy(r->ctx.programs);
     gl_texture_destroy(&r->ctx.white);
-    gl_texture_destroy(&r->ctx.tiles);
-    gl.DeleteFramebuffers(1, &r->ctx.tiles_framebuffer);
-    gl_texture_destroy(&r->ctx.interleaved);
-    gl_texture_destroy(&r->ctx.sample_scratch);
-    gl_texture_destroy(&r->ctx.sum);
-    pass_scratch_finish(&r->ctx);
-    gl.DeleteFramebuffers(1, &r->ctx.sum_framebuffer);
-    gl.DeleteFramebuffers(1, &r->ctx.interleaved_framebuffer);
     GLuint buffers[] = {r->ctx.light_block, r->ctx.param_block};
     gl.DeleteBuffers(2, buffers);
     gl.DeleteVertexArrays(1, &r->ctx.empty_array);
@@ -119,7 +115,7 @@ void pen_renderer_destroy(struct pen_renderer *r)
 
 const struct pen_device_info *pen_renderer_device(const struct pen_renderer *r)
 {
-    return &r->ctx.device;
+    return &r->device;
 }
 
 static struct scene *find_scene(const struct pen_renderer *r, const uint8_t id[PEN_ID_BYTES])
@@ -243,7 +239,7 @@ bool pen_renderer_render(struct pen_renderer *r, const struct pen_request *reque
     memset(result, 0, sizeof *result);
     memset(frame, 0, sizeof *frame);
     result->completed = *request;
-    result->device = r->ctx.device;
+    result->device = r->device;
     struct scene *scene = find_scene(r, request->scene);
     if (!pen_request_check(request, pen_renderer_catalogue(), error))
         goto fail;

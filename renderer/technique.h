@@ -7,12 +7,13 @@
 #include "protocol/result.h"
 #include "protocol/technique_info.h"
 #include "renderer/gl/program.h"
-#include "renderer/gl/texture.h"
+#include "renderer/gl/target.h"
 #include "renderer/gl/timer.h"
 #include "renderer/light/light.h"
 #include "renderer/scene/scene.h"
 #include "renderer/scene/view.h"
 
+struct passes;
 struct shadow_cache;
 
 /* Per renderer: lives as long as the context. */
@@ -20,31 +21,24 @@ struct technique_ctx {
     struct gl_programs *programs;
     struct gl_samplers samplers;
     struct gl_timer timer;
-    struct shadow_cache *shadows;
-    struct pen_device_info device;
+    struct shadow_cache *shadows;    /* inputs that are kept between requests */
+    struct passes *passes;           /* what passes keep for themselves */
+    bool software;                   /* OpenGL runs on the CPU */
     GLuint empty_array;              /* vertex array for passes that make their own vertices */
     GLuint light_block, param_block; /* uniform buffers, UBO_LIGHT and UBO_PARAMS */
     struct gl_texture white;         /* 1 x 1, bound where a light has no emission texture */
-    struct gl_texture tiles;         /* of passes/map/classify.c */
-    GLuint tiles_framebuffer;
-    struct gl_texture interleaved; /* scratch of passes/filter/interleave.c */
-    GLuint interleaved_framebuffer;
-    struct gl_texture sample_scratch; /* of passes/light/sample_maps.c */
-    struct gl_texture sum;            /* RGBA32F accumulator of methods that add passes */
-    GLuint sum_framebuffer;
-    struct gl_texture scratch[12]; /* of passes/draw/scratch.c */
-    uint64_t gpu_memory;           /* the budget of everything, bytes */
-    uint64_t shadow_memory;        /* bytes that kept shadow inputs of a frame may take together */
+    uint64_t gpu_memory;             /* the budget of everything, bytes */
+    uint64_t shadow_memory; /* bytes that kept shadow inputs of a frame may take together */
     uint64_t shadow_budget; /* the share of one face of one light in it; set for every frame */
 };
 
 struct gbuffer {
-    struct gl_texture depth;    /* D32F, reversed, 0: background */
-    struct gl_texture normal;   /* RGBA16: octahedral geometric normal, octahedral shading normal */
-    struct gl_texture albedo;   /* RGBA8: square root of albedo, flags */
-    struct gl_texture surface;  /* RGBA8: roughness, metallic, occlusion, specular scale */
-    struct gl_texture emission; /* R11G11B10F; only when the scene has any */
-    GLuint framebuffer;
+    struct gl_target depth;    /* D32F, reversed, 0: background */
+    struct gl_target normal;   /* RGBA16: octahedral geometric normal, octahedral shading normal */
+    struct gl_target albedo;   /* RGBA8: square root of albedo, flags */
+    struct gl_target surface;  /* RGBA8: roughness, metallic, occlusion, specular scale */
+    struct gl_target emission; /* R11G11B10F; only when the scene has any */
+    GLuint framebuffer;        /* of all of them */
 };
 
 /* One call of a method: one face of one light of one frame. */

@@ -1,7 +1,9 @@
 #include "renderer/frame/frame.h"
 #include "renderer/frame/layers.h"
 #include "renderer/frame/output.h"
-#include "renderer/passes/draw/passes.h"
+#include "renderer/passes/draw/gbuffer.h"
+#include "renderer/passes/draw/screen.h"
+#include "renderer/passes/map/shadow_cache.h"
 #include <cglm/cglm.h>
 #include <math.h>
 #include <stdio.h>
@@ -28,62 +30,16 @@ struct frame {
     struct frame_work work;
 };
 
-static void release(GLuint *framebuffer, struct gl_texture *texture)
-{
-    if (*framebuffer)
-        gl.DeleteFramebuffers(1, framebuffer);
-    *framebuffer = 0;
-    gl_texture_destroy(texture);
-}
-
-void frame_targets_finish(struct frame_targets *t)
-{
-    struct gbuffer *g = &t->gbuffer;
-    struct gl_texture *textures[] = {&g->depth, &g->normal, &g->albedo, &g->surface, &g->emission};
-    for (int i = 0; i < 5; i++)
-        gl_texture_destroy(textures[i]);
-    if (g->framebuffer)
-        gl.DeleteFramebuffers(1, &g->framebuffer);
-    for (uint32_t i = 0; i < t->vis.layers; i++)
-        gl.DeleteFramebuffers(1, &t->vis_framebuffers[i]);
-    gl_texture_destroy(&t->vis);
-    release(&t->color_framebuffer, &t->color);
-    release(&t->beauty_framebuffer, &t->beauty_sum);
-    release(&t->vis_sum_framebuffer, &t->vis_sum);
-    release(&t->classes.framebuffer, &t->classes.sum);
-    release(&t->variance.framebuffer, &t->variance.sum);
-    memset(t, 0, sizeof *t);
-}
-
-static void fit_sum(
-    struct gl_texture *texture, GLuint *framebuffer, uint32_t width, uint32_t height)
-{
-    static const float zero[4] = {0};
-    if (gl_texture_fit(texture, GL_RGBA32F, width, height, 0, 1) || !*framebuffer) {
-        gl.DeleteFramebuffers(1, framebuffer);
-        const struct gl_texture *color = texture;
-        *framebuffer = gl_framebuffer_create(&color, 1, NULL);
-    }
-    gl.ClearNamedFramebufferfv(*framebuffer, GL_COLOR, 0, zero);
-}
-
 static void fit_targets(struct frame *f)
 {
     struct frame_targets *t = f->job->targets;
     const struct pen_request *r = f->job->request;
-    uint32_t layers = f->light_count ? f->light_count : 1, old = t->vis.layers;
     frame_output_fit(t, r);
-    if (gl_texture_fit(&t->vis, GL_RGBA16F, r->width, r->height, layers, 1)) {
-        gl.DeleteFramebuffers((GLsizei)old, t->vis_framebuffers);
-        gl.CreateFramebuffers((GLsizei)layers, t->vis_framebuffers);
-        for (uint32_t i = 0; i < layers; i++)
-            gl.NamedFramebufferTextureLayer(
-                t->vis_framebuffers[i], GL_COLOR_ATTACHMENT0, t->vis.name, 0, (GLint)i);
-    }
+    gl_target_fit(&t->vis, GL_RGBA16F, r->width, r->height, f->light_count ? f->light_count : 1, 1);
     if (!frame_output_is_direct(r) && frame_output_needs(r, PEN_SOURCE_BEAUTY))
-        fit_sum(&t->beauty_sum, &t->beauty_framebuffer, r->width, r->height);
+        frame_fit_sum(&t->beauty, GL_RGBA32F, r);
     if (frame_output_needs(r, PEN_SOURCE_VISIBILITY))
-        fit_sum(&t->vis_sum, &t->vis_sum_framebuffer, r->width, r->height);
+        frame_fit_sum(&t->visibility, GL_RGBA32F, r);
 }
 
 static void upload_view(struct frame *f, uint32_t number)
@@ -180,7 +136,7 @@ static bool record_face(
         .technique = job->technique,
         .params = job->request->technique_params,
         .state = job->technique_state,
-        .vis_framebuffer = job->targets->vis_framebuffers[light],
+        .vis_framebuffer = job->targets->vis.framebuffer,
         .emission = emission ? &emission->texture : &ctx->white,
         .result = f->result,
         .width = job->request->width,
@@ -214,8 +170,9 @@ static bool record_visibility(struct frame *f, struct pen_error *error)
     gl.NamedBufferData(job->ctx->param_block, sizeof job->request->technique_params,
         job->request->technique_params, GL_STREAM_DRAW);
     for (uint32_t i = 0; i < f->light_count; i++) {
-        gl.ClearNamedFramebufferfv(job->targets->vis_framebuffers[i], GL_COLOR, 0,
-            f->lights[i].faces[0].emission_mean); /* what an unshadowed receiver sees */
+        gl_target_aim(&job->targets->vis, 0, i);
+        /* What an unshadowed receiver sees. */
+        gl_target_clear(&job->targets->vis, f->lights[i].faces[0].emission_mean);
         if (!record_light(f, i, error))
             return false;
     }
@@ -249,15 +206,17 @@ static bool shade(struct frame *f, struct pen_error *error)
 {
     const struct frame_job *job = f->job;
     const struct frame_targets *t = job->targets;
-    bool direct = frame_output_is_direct(job->request), emission = t->gbuffer.emission.name != 0;
+    bool direct = frame_output_is_direct(job->request),
+         emission = t->gbuffer.emission.texture.name != 0;
     struct shade_block block;
     make_shade_block(f, &block);
-    struct pass_texture textures[] = {{UNIT_DEPTH, t->gbuffer.depth.name, GL_SAMPLE_NEAREST},
-        {UNIT_NORMAL, t->gbuffer.normal.name, GL_SAMPLE_NEAREST},
-        {UNIT_ALBEDO, t->gbuffer.albedo.name, GL_SAMPLE_NEAREST},
-        {UNIT_SURFACE, t->gbuffer.surface.name, GL_SAMPLE_NEAREST},
-        {UNIT_SOURCE, t->vis.name, GL_SAMPLE_NEAREST},
-        {UNIT_EMITTED, t->gbuffer.emission.name, GL_SAMPLE_NEAREST}};
+    struct pass_texture textures[] = {
+        {UNIT_DEPTH, t->gbuffer.depth.texture.name, GL_SAMPLE_NEAREST},
+        {UNIT_NORMAL, t->gbuffer.normal.texture.name, GL_SAMPLE_NEAREST},
+        {UNIT_ALBEDO, t->gbuffer.albedo.texture.name, GL_SAMPLE_NEAREST},
+        {UNIT_SURFACE, t->gbuffer.surface.texture.name, GL_SAMPLE_NEAREST},
+        {UNIT_SOURCE, t->vis.texture.name, GL_SAMPLE_NEAREST},
+        {UNIT_EMITTED, t->gbuffer.emission.texture.name, GL_SAMPLE_NEAREST}};
     bool rect = false, round = false, punctual = false;
     for (uint32_t i = 0; i < f->light_count; i++) {
         uint32_t type = f->lights[i].source->type;
@@ -277,7 +236,7 @@ static bool shade(struct frame *f, struct pen_error *error)
             .stage = PEN_STAGE_SHADE,
             .textures = textures,
             .texture_count = emission ? 6 : 5,
-            .framebuffer = direct ? t->color_framebuffer : t->beauty_framebuffer,
+            .framebuffer = direct ? t->color.framebuffer : t->beauty.framebuffer,
             .width = job->request->width,
             .height = job->request->height,
             .add = !direct,
@@ -290,14 +249,14 @@ static bool add_visibility(struct frame *f, struct pen_error *error)
 {
     struct average_block block = {.count = {(int32_t)f->light_count}};
     const struct frame_targets *t = f->job->targets;
-    struct pass_texture texture = {UNIT_SOURCE, t->vis.name, GL_SAMPLE_NEAREST};
+    struct pass_texture texture = {UNIT_SOURCE, t->vis.texture.name, GL_SAMPLE_NEAREST};
     return pass_fill(f->job->ctx,
         &(struct pass_fill){.name = "average",
             .fragment = "average.frag",
             .stage = PEN_STAGE_SHADE,
             .textures = &texture,
             .texture_count = 1,
-            .framebuffer = t->vis_sum_framebuffer,
+            .framebuffer = t->visibility.framebuffer,
             .width = f->job->request->width,
             .height = f->job->request->height,
             .add = true,

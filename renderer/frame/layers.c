@@ -1,5 +1,6 @@
 #include "renderer/frame/layers.h"
 #include "renderer/frame/output.h"
+#include "renderer/passes/draw/screen.h"
 #include "renderer/passes/map/classify.h"
 
 #define SHARED_ROWS "renderer/shaders/frame/classes.def"
@@ -15,28 +16,17 @@ bool frame_layers_want_error(const struct pen_request *r, const struct technique
     return technique->estimates_error && frame_output_needs(r, PEN_SOURCE_VARIANCE);
 }
 
-static void fit(struct frame_layer *layer, GLenum format, const struct pen_request *r)
-{
-    static const float zero[4] = {0};
-    const struct gl_texture *color = &layer->sum;
-    if (gl_texture_fit(&layer->sum, format, r->width, r->height, 0, 1) || !layer->framebuffer) {
-        gl.DeleteFramebuffers(1, &layer->framebuffer);
-        layer->framebuffer = gl_framebuffer_create(&color, 1, NULL);
-    }
-    gl.ClearNamedFramebufferfv(layer->framebuffer, GL_COLOR, 0, zero);
-}
-
 void frame_layers_begin(const struct frame_job *job, struct pen_result *result)
 {
     const struct pen_request *r = job->request;
     const char *title = job->technique->info.title;
     /* Half floats count to 2048 exactly; there are at most 8 lights in 64 frames. */
     if (frame_layers_want_classes(r))
-        fit(&job->targets->classes, GL_RG16F, r);
+        frame_fit_sum(&job->targets->classes, GL_RG16F, r);
     bool estimated = frame_layers_want_error(r, job->technique);
     bool alone = r->output.layer != PEN_LAYER_ALL && frame_output_needs(r, PEN_SOURCE_VARIANCE);
     if (estimated || alone)
-        fit(&job->targets->variance, GL_R32F, r);
+        frame_fit_sum(&job->targets->variance, GL_R32F, r);
     if (!estimated && alone)
         pen_result_warn(result, "%s does not estimate its error: the layer is 0.", title);
 }
@@ -45,7 +35,7 @@ bool frame_layers_add_classes(const struct frame_job *job, const struct gl_textu
     bool first, struct pen_error *error)
 {
     struct pass_texture textures[] = {
-        {UNIT_DEPTH, job->targets->gbuffer.depth.name, GL_SAMPLE_NEAREST},
+        {UNIT_DEPTH, job->targets->gbuffer.depth.texture.name, GL_SAMPLE_NEAREST},
         {UNIT_TILES, tiles ? tiles->name : 0, GL_SAMPLE_NEAREST}};
     struct classes_block block = {.tile = {CLASSIFY_TILE, first ? 1 : 0}};
     return pass_fill(job->ctx,

@@ -1,7 +1,7 @@
 /* Layers about the work rather than the light: what the classifier proved of a pixel, and how far
  * off its visibility may be; and how many pixels there were to work on. */
 #pragma once
-#include "renderer/frame/frame.h"
+#include "renderer/frame/job.h"
 
 bool frame_layers_want_classes(const struct pen_request *request);
 /* Only for methods that estimate their error. */

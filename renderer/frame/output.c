@@ -1,7 +1,7 @@
 #include "renderer/frame/output.h"
 #include "protocol/memory.h"
 #include "renderer/frame/layers.h"
-#include "renderer/passes/draw/passes.h"
+#include "renderer/passes/draw/screen.h"
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -40,12 +40,7 @@ static const size_t pixel_bytes[] = {4, 8, 16};
 
 static void fit_color(struct frame_targets *t, const struct pen_request *r, enum pen_pixel pixel)
 {
-    GLenum format = internal_formats[pixel];
-    if (!gl_texture_fit(&t->color, format, r->width, r->height, 0, 1) && t->color_framebuffer)
-        return;
-    gl.DeleteFramebuffers(1, &t->color_framebuffer);
-    const struct gl_texture *color = &t->color;
-    t->color_framebuffer = gl_framebuffer_create(&color, 1, NULL);
+    gl_target_fit(&t->color, internal_formats[pixel], r->width, r->height, 0, 1);
 }
 
 void frame_output_fit(struct frame_targets *t, const struct pen_request *r)
@@ -78,13 +73,13 @@ static const struct gl_texture *source_of(const struct frame_targets *t, uint32_
     static const struct gl_texture none;
     switch (pen_layers[layer].source) {
     case PEN_SOURCE_BEAUTY:
-        return &t->beauty_sum;
+        return &t->beauty.texture;
     case PEN_SOURCE_VISIBILITY:
-        return &t->vis_sum;
+        return &t->visibility.texture;
     case PEN_SOURCE_CLASSES:
-        return &t->classes.sum;
+        return &t->classes.texture;
     case PEN_SOURCE_VARIANCE:
-        return &t->variance.sum;
+        return &t->variance.texture;
     default:
         return &none;
     }
@@ -97,10 +92,11 @@ static bool convert(const struct frame_job *job, const struct output_block *bloc
     char defines[64];
     snprintf(defines, sizeof defines, "#define LAYER layer_%s\n%s", pen_layers[layer].name,
         raw ? "#define RAW true\n" : "#define RAW false\n");
-    struct pass_texture textures[] = {{UNIT_DEPTH, t->gbuffer.depth.name, GL_SAMPLE_NEAREST},
-        {UNIT_NORMAL, t->gbuffer.normal.name, GL_SAMPLE_NEAREST},
-        {UNIT_ALBEDO, t->gbuffer.albedo.name, GL_SAMPLE_NEAREST},
-        {UNIT_SURFACE, t->gbuffer.surface.name, GL_SAMPLE_NEAREST},
+    struct pass_texture textures[] = {
+        {UNIT_DEPTH, t->gbuffer.depth.texture.name, GL_SAMPLE_NEAREST},
+        {UNIT_NORMAL, t->gbuffer.normal.texture.name, GL_SAMPLE_NEAREST},
+        {UNIT_ALBEDO, t->gbuffer.albedo.texture.name, GL_SAMPLE_NEAREST},
+        {UNIT_SURFACE, t->gbuffer.surface.texture.name, GL_SAMPLE_NEAREST},
         {UNIT_SOURCE, source_of(t, layer)->name, GL_SAMPLE_NEAREST}};
     return pass_fill(job->ctx,
         &(struct pass_fill){.name = "output",
@@ -109,7 +105,7 @@ static bool convert(const struct frame_job *job, const struct output_block *bloc
             .stage = PEN_STAGE_SHADE,
             .textures = textures,
             .texture_count = sizeof textures / sizeof *textures,
-            .framebuffer = t->color_framebuffer,
+            .framebuffer = t->color.framebuffer,
             .width = job->request->width,
             .height = job->request->height,
             .extra = block,
@@ -139,7 +135,7 @@ static void read_plane(
     plane->channels = channels_of(layer, pixel);
     plane->data = pen_alloc((size_t)frame->width * frame->height * pixel_bytes[pixel], 1);
     gl_timer_begin(&job->ctx->timer, PEN_STAGE_READBACK, "readback");
-    gl.BindFramebuffer(GL_FRAMEBUFFER, job->targets->color_framebuffer);
+    gl.BindFramebuffer(GL_FRAMEBUFFER, job->targets->color.framebuffer);
     gl.PixelStorei(GL_PACK_ALIGNMENT, 1);
     gl.ReadPixels(0, 0, (GLsizei)frame->width, (GLsizei)frame->height, GL_RGBA, read_types[pixel],
         plane->data);

@@ -1,6 +1,7 @@
 /* The last step of a frame: layers into the pixel type of the file, and out of the GPU. */
 #pragma once
-#include "renderer/frame/frame.h"
+#include "renderer/frame/job.h"
+#include "renderer/picture.h"
 
 /* A layer of the output is made of that. */
 bool frame_output_needs(const struct pen_request *request, enum pen_layer_source source);

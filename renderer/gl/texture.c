@@ -65,17 +65,6 @@ void gl_texture_destroy(struct gl_texture *texture)
     memset(texture, 0, sizeof *texture);
 }
 
-bool gl_texture_fit(struct gl_texture *t, GLenum format, uint32_t width, uint32_t height,
-    uint32_t layers, uint32_t levels)
-{
-    if (t->name && t->format == format && t->width == width && t->height == height &&
-        t->layers == layers && (!levels || t->levels == levels))
-        return false;
-    gl_texture_destroy(t);
-    *t = gl_texture_create(format, width, height, layers, levels);
-    return true;
-}
-
 GLuint gl_framebuffer_create(
     const struct gl_texture *const *colors, uint32_t count, const struct gl_texture *depth)
 {

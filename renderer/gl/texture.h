@@ -16,12 +16,8 @@ struct gl_texture gl_texture_create(
     GLenum format, uint32_t width, uint32_t height, uint32_t layers, uint32_t levels);
 void gl_texture_destroy(struct gl_texture *texture);
 
-/* Makes *texture be of this shape, reusing it when it already is. True when it was made anew. */
-bool gl_texture_fit(struct gl_texture *texture, GLenum format, uint32_t width, uint32_t height,
-    uint32_t layers, uint32_t levels);
-
-/* A framebuffer with these colour attachments (level 0, or one layer of an array when
- * layer >= 0). */
+/* A framebuffer with level 0 of these as its attachments, for what gl_target does not fit: several
+ * at once, or one that lasts as long as a pass. `depth` may be NULL. */
 GLuint gl_framebuffer_create(
     const struct gl_texture *const *colors, uint32_t count, const struct gl_texture *depth);
 

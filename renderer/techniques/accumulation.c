@@ -1,3 +1,4 @@
+#include "renderer/passes/draw/screen.h"
 #include "renderer/passes/light/light_bits.h"
 #include "renderer/techniques/patch_params.h"
 

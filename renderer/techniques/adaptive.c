@@ -1,5 +1,6 @@
 #include "renderer/passes/map/classify.h"
 #include "renderer/passes/filter/interleave.h"
+#include "renderer/passes/map/depth_map.h"
 #include "renderer/techniques/convolution_params.h"
 
 static const char *const mode_names[] = {"adaptive", "fixed2", "average", NULL};
@@ -100,8 +101,10 @@ static bool record(struct technique_run *run, struct pen_error *error)
         map ? pass_caster_min_max(run, params->map_size, error) : NULL;
     if (!min_max)
         return false;
-    if (run->request->classify.on &&
-        !(pass.tiles = pass_classify(run, min_max, 1.5f * params->min_filter + 1, error)))
+    struct classify_desc classes = {.map_size = params->map_size,
+        .margin_texels = 1.5f * params->min_filter + 1,
+        .umbra = true};
+    if (!pass_classify(run, &classes, &pass.tiles, error))
         return false;
     struct pass_texture pyramid = {UNIT_MIN_MAX, min_max->textures[0].name, GL_SAMPLE_NEAREST};
     pass.shadow = &map->textures[0];

@@ -1,6 +1,9 @@
+#include "renderer/passes/draw/screen.h"
 #include "renderer/passes/map/classify.h"
 #include "renderer/passes/light/light_tree.h"
 #include "renderer/passes/light/sample_maps.h"
+#include "renderer/passes/map/min_max.h"
+#include "renderer/passes/map/shadow_cache.h"
 #include "renderer/techniques/map_params.h"
 #include <math.h>
 #include <string.h>
@@ -63,8 +66,8 @@ struct resolve_block {
 };
 
 struct state {
-    struct gl_texture bits[BIT_GROUPS];
-    GLuint framebuffer, counters, queries[MAX_TESTED];
+    struct gl_target bits[BIT_GROUPS];
+    GLuint counters, queries[MAX_TESTED];
 };
 
 /* One face's refinement. */
@@ -76,6 +79,7 @@ struct refinement {
     struct sample_point points[LIGHT_TREE_POINTS];
     struct used_bits used; /* points that have been tested, by page */
     const struct gl_texture *maps[LIGHT_PAGES];
+    const struct gl_target *sum; /* of the filtered lookups; NULL without a filter */
     uint32_t pages, most_maps;
 };
 
@@ -83,7 +87,6 @@ static bool create(struct technique_ctx *ctx, void *data, struct pen_error *erro
 {
     struct state *state = data;
     (void)ctx, (void)error;
-    gl.CreateFramebuffers(1, &state->framebuffer);
     gl.CreateBuffers(1, &state->counters);
     gl.NamedBufferData(state->counters, 4 * MAX_TESTED, NULL, GL_DYNAMIC_READ);
     gl.CreateQueries(GL_SAMPLES_PASSED, MAX_TESTED, state->queries);
@@ -95,32 +98,33 @@ static void destroy(struct technique_ctx *ctx, void *data)
     struct state *state = data;
     (void)ctx;
     for (int i = 0; i < BIT_GROUPS; i++)
-        gl_texture_destroy(&state->bits[i]);
-    gl.DeleteFramebuffers(1, &state->framebuffer);
+        gl_target_destroy(&state->bits[i]);
     gl.DeleteBuffers(1, &state->counters);
     gl.DeleteQueries(MAX_TESTED, state->queries);
 }
 
 static const uint32_t group_first[BIT_GROUPS + 1] = {0, 2, 6, LIGHT_PAGES};
 
-/* Aims the framebuffer at a page's bits and clears them. Groups are made as they are needed. */
-static void begin_page(struct technique_run *run, uint32_t page)
+/* A page's bits, aimed at and, when it is `fresh`, cleared. Groups are made as they are needed. */
+static const struct gl_target *page_bits(struct technique_run *run, uint32_t page, bool fresh)
 {
     static const float zero[4] = {0};
     struct state *state = run->state;
     int group = page < 2 ? 0 : page < 6 ? 1 : 2;
-    gl_texture_fit(&state->bits[group], GL_RG16, run->width, run->height,
-        group_first[group + 1] - group_first[group], 1);
-    gl.NamedFramebufferTextureLayer(state->framebuffer, GL_COLOR_ATTACHMENT0,
-        state->bits[group].name, 0, (GLint)(page - group_first[group]));
-    gl.ClearNamedFramebufferfv(state->framebuffer, GL_COLOR, 0, zero);
+    struct gl_target *bits = &state->bits[group];
+    gl_target_fit(
+        bits, GL_RG16, run->width, run->height, group_first[group + 1] - group_first[group], 1);
+    gl_target_aim(bits, 0, page - group_first[group]);
+    if (fresh)
+        gl_target_clear(bits, zero);
+    return bits;
 }
 
 static void bind_bits(const struct state *state, struct pass_texture textures[BIT_GROUPS])
 {
     for (uint32_t i = 0; i < BIT_GROUPS; i++)
         textures[i] = (struct pass_texture){UNIT_FREE + i,
-            state->bits[i].name ? state->bits[i].name : state->bits[0].name, GL_SAMPLE_NEAREST};
+            state->bits[state->bits[i].texture.name ? i : 0].texture.name, GL_SAMPLE_NEAREST};
 }
 
 static struct sample_map entry_of(const struct refinement *r, uint32_t point, uint32_t layer)
@@ -143,8 +147,7 @@ static bool test_page(
     uint32_t fresh = wanted & ~r->used.words[number];
     if (!fresh)
         return true;
-    if (!r->used.words[number])
-        begin_page(run, number);
+    const struct gl_target *bits = page_bits(run, number, !r->used.words[number]);
     for (uint32_t i = 0; i < page->count; i++) {
         points[i] = r->points[page->points[i]];
         if (fresh >> i & 1)
@@ -155,10 +158,6 @@ static bool test_page(
     if (!r->maps[number])
         return false;
     r->used.words[number] |= fresh;
-    int group = number < 2 ? 0 : number < 6 ? 1 : 2;
-    struct state *state = run->state;
-    gl.NamedFramebufferTextureLayer(state->framebuffer, GL_COLOR_ATTACHMENT0,
-        state->bits[group].name, 0, (GLint)(number - group_first[group]));
     struct pass_texture textures[] = {
         {UNIT_FREE + BIT_GROUPS, r->maps[number]->name, GL_SAMPLE_NEAREST_BORDER},
         {UNIT_MIN_MAX, r->min_max->textures[0].name, GL_SAMPLE_NEAREST}};
@@ -168,7 +167,7 @@ static bool test_page(
             .defines = sample_map_kernel(params->kernel),
             .textures = textures,
             .texture_count = 2,
-            .framebuffer = state->framebuffer,
+            .framebuffer = bits->framebuffer,
             .add = true,
             .tiles = r->tiles,
             .extra = &block,
@@ -313,7 +312,7 @@ static bool filter_pages(struct refinement *r, struct pen_error *error)
 {
     struct technique_run *run = r->run;
     const struct adaptive_sampling *params = run->params;
-    GLuint sum = pass_clear_sum(run);
+    r->sum = pass_sum(run);
     for (uint32_t number = 0; number < r->pages; number++) {
         struct filter_block block = {.used = r->used};
         struct pass_texture textures[BIT_GROUPS + 1];
@@ -330,7 +329,7 @@ static bool filter_pages(struct refinement *r, struct pen_error *error)
                     .defines = sample_map_kernel(params->kernel),
                     .textures = textures,
                     .texture_count = BIT_GROUPS + 1,
-                    .framebuffer = sum,
+                    .framebuffer = r->sum->framebuffer,
                     .add = true,
                     .tiles = r->tiles,
                     .extra = &block,
@@ -351,8 +350,8 @@ static bool resolve(struct refinement *r, struct pen_error *error)
     block.count[1] = (int32_t)r->pages;
     run->result->shadow_maps += (uint32_t)block.count[0];
     bind_bits(run->state, textures);
-    textures[BIT_GROUPS] =
-        (struct pass_texture){UNIT_FREE + BIT_GROUPS, run->ctx->sum.name, GL_SAMPLE_NEAREST};
+    textures[BIT_GROUPS] = (struct pass_texture){
+        UNIT_FREE + BIT_GROUPS, r->sum ? r->sum->texture.name : 0, GL_SAMPLE_NEAREST};
     return pass_screen(run,
         &(struct pass_screen){.name = "light resolve",
             .body = "adaptive_resolve.glsl",
@@ -392,9 +391,9 @@ static bool record(struct technique_run *run, struct pen_error *error)
     r.min_max = pass_caster_min_max(run, MIN_MAX_SIZE, error);
     if (!r.min_max)
         return false;
-    if (run->request->classify.on &&
-        !(r.tiles = pass_classify_lit(run, r.min_max,
-              (float)(params->kernel + 1) * MIN_MAX_SIZE / (float)params->map_size, error)))
+    struct classify_desc classes = {.map_size = MIN_MAX_SIZE,
+        .margin_texels = (float)(params->kernel + 1) * MIN_MAX_SIZE / (float)params->map_size};
+    if (!pass_classify(run, &classes, &r.tiles, error))
         return false;
     for (uint32_t i = 0; i < LIGHT_TREE_POINTS; i++)
         r.points[i] = sample_point_at(

@@ -33,20 +33,14 @@ static const struct pen_param rows[] = {
 
 struct bitmask_state {
     struct light_bits bits[2]; /* by enum light_shape */
-    struct gl_texture emission;
-    GLuint framebuffer;
+    struct gl_target emission; /* of the points */
 };
 
 static bool sample_emission(
     struct technique_run *run, const struct light_bits *bits, struct pen_error *error)
 {
     struct bitmask_state *state = run->state;
-    if (gl_texture_fit(&state->emission, GL_RGBA32F, bits->at.width, bits->at.height, 0, 1) ||
-        !state->framebuffer) {
-        gl.DeleteFramebuffers(1, &state->framebuffer);
-        const struct gl_texture *color = &state->emission;
-        state->framebuffer = gl_framebuffer_create(&color, 1, NULL);
-    }
+    gl_target_fit(&state->emission, GL_RGBA32F, bits->at.width, bits->at.height, 0, 1);
     struct pass_texture textures[] = {{UNIT_FREE, bits->at.name, GL_SAMPLE_NEAREST},
         {UNIT_EMISSION, run->emission->name, GL_SAMPLE_TRILINEAR}};
     return pass_fill(run->ctx,
@@ -55,7 +49,7 @@ static bool sample_emission(
             .stage = PEN_STAGE_TECHNIQUE,
             .textures = textures,
             .texture_count = 2,
-            .framebuffer = state->framebuffer,
+            .framebuffer = state->emission.framebuffer,
             .width = bits->at.width,
             .height = bits->at.height},
         error);
@@ -80,7 +74,7 @@ static bool record(struct technique_run *run, struct pen_error *error)
     struct pass_texture textures[] = {{UNIT_FREE, layers->textures[0].name, GL_SAMPLE_NEAREST},
         {UNIT_MIN_MAX, layers->textures[1].name, GL_SAMPLE_NEAREST},
         {UNIT_FREE + 1, bits->below.name, GL_SAMPLE_NEAREST},
-        {UNIT_FREE + 2, state->emission.name, GL_SAMPLE_NEAREST}};
+        {UNIT_FREE + 2, state->emission.texture.name, GL_SAMPLE_NEAREST}};
     struct pass_screen pass = {.name = "bitmask",
         .body = "bitmask.glsl",
         .defines = textured ? "#define TEXTURED\n" : NULL,
@@ -97,8 +91,7 @@ static void destroy(struct technique_ctx *ctx, void *data)
     struct bitmask_state *state = data;
     for (int i = 0; i < 2; i++)
         light_bits_finish(&state->bits[i]);
-    gl_texture_destroy(&state->emission);
-    gl.DeleteFramebuffers(1, &state->framebuffer);
+    gl_target_destroy(&state->emission);
 }
 
 const struct technique technique_bitmask = {

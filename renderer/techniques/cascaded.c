@@ -1,7 +1,10 @@
 #include "protocol/memory.h"
+#include "renderer/passes/draw/screen.h"
 #include "renderer/passes/light/cascades.h"
 #include "renderer/passes/map/classify.h"
 #include "renderer/passes/light/sample_maps.h"
+#include "renderer/passes/map/min_max.h"
+#include "renderer/passes/map/shadow_cache.h"
 #include "renderer/techniques/map_params.h"
 #include <math.h>
 #include <stdio.h>
@@ -78,8 +81,7 @@ struct cascade {
 };
 
 struct state {
-    struct gl_texture tiles;
-    GLuint framebuffer;
+    struct gl_target tiles;
     float (*depth)[2]; /* tiles on the CPU */
 };
 
@@ -87,8 +89,7 @@ static void destroy(struct technique_ctx *ctx, void *data)
 {
     struct state *state = data;
     (void)ctx;
-    gl_texture_destroy(&state->tiles);
-    gl.DeleteFramebuffers(1, &state->framebuffer);
+    gl_target_destroy(&state->tiles);
     free(state->depth);
 }
 
@@ -101,23 +102,19 @@ static bool read_tiles(
         .height = (run->height + TILE - 1) / TILE,
         .size = TILE};
     size_t bytes = (size_t)tiles->width * tiles->height * sizeof *state->depth;
-    if (gl_texture_fit(&state->tiles, GL_RG32F, tiles->width, tiles->height, 0, 1) ||
-        !state->depth) {
-        const struct gl_texture *color = &state->tiles;
-        gl.DeleteFramebuffers(1, &state->framebuffer);
-        state->framebuffer = gl_framebuffer_create(&color, 1, NULL);
+    if (gl_target_fit(&state->tiles, GL_RG32F, tiles->width, tiles->height, 0, 1)) {
         free(state->depth);
         state->depth = pen_alloc(bytes, 1);
     }
     int32_t block[4] = {TILE};
-    struct pass_texture depth = {UNIT_DEPTH, run->gbuffer->depth.name, GL_SAMPLE_NEAREST};
+    struct pass_texture depth = {UNIT_DEPTH, run->gbuffer->depth.texture.name, GL_SAMPLE_NEAREST};
     if (!pass_fill(run->ctx,
             &(struct pass_fill){.name = "depth tiles",
                 .fragment = "cascaded_tiles.frag",
                 .stage = PEN_STAGE_TECHNIQUE,
                 .textures = &depth,
                 .texture_count = 1,
-                .framebuffer = state->framebuffer,
+                .framebuffer = state->tiles.framebuffer,
                 .width = tiles->width,
                 .height = tiles->height,
                 .extra = block,
@@ -125,7 +122,7 @@ static bool read_tiles(
             error))
         return false;
     gl.PixelStorei(GL_PACK_ALIGNMENT, 4);
-    gl.GetTextureImage(state->tiles.name, 0, GL_RG, GL_FLOAT, (GLsizei)bytes, state->depth);
+    gl.GetTextureImage(state->tiles.texture.name, 0, GL_RG, GL_FLOAT, (GLsizei)bytes, state->depth);
     tiles->depth = (const float(*)[2])state->depth;
     return true;
 }
@@ -189,7 +186,8 @@ static const struct shadow_input *cascade_maps(
 }
 
 static bool add_cascade(struct technique_run *run, struct cascade *c,
-    const struct gl_texture *tiles, const struct shadow_input *min_max, struct pen_error *error)
+    const struct gl_texture *tiles, const struct shadow_input *min_max, const struct gl_target *sum,
+    struct pen_error *error)
 {
     static const char *const names[CASCADES] = {"cascade near", "cascade middle", "cascade far"};
     make_views(run, c);
@@ -210,7 +208,7 @@ static bool add_cascade(struct technique_run *run, struct cascade *c,
             .defines = defines,
             .textures = textures,
             .texture_count = 2,
-            .framebuffer = run->ctx->sum_framebuffer,
+            .framebuffer = sum->framebuffer,
             .add = true,
             .tiles = tiles,
             .extra = &c->block,
@@ -260,11 +258,12 @@ static bool record(struct technique_run *run, struct pen_error *error)
     const struct shadow_input *min_max = pass_caster_min_max(run, MIN_MAX_SIZE, error);
     if (!min_max)
         return false;
-    const struct gl_texture *tiles = NULL;
-    if (run->request->classify.on &&
-        !(tiles = pass_classify_lit(run, min_max, kernel_reach(sizes, kernels), error)))
+    struct classify_desc classes = {
+        .map_size = MIN_MAX_SIZE, .margin_texels = kernel_reach(sizes, kernels)};
+    const struct gl_texture *tiles;
+    if (!pass_classify(run, &classes, &tiles, error))
         return false;
-    pass_clear_sum(run);
+    const struct gl_target *sum = pass_sum(run);
     for (uint32_t i = 0; i < CASCADES; i++) {
         static struct cascade c; /* large, and only one thread renders */
         bool point = !(face->extent[0] > 0 || face->extent[1] > 0);
@@ -276,14 +275,14 @@ static bool record(struct technique_run *run, struct pen_error *error)
         if (!cascade_bounds(run->view, face, &depth_tiles, fmaxf(c.block.fade[0], range[0]),
                 fminf(c.block.fade[3], range[1]), &c.bounds))
             continue;
-        if (!add_cascade(run, &c, tiles, min_max, error))
+        if (!add_cascade(run, &c, tiles, min_max, sum, error))
             return false;
     }
-    struct pass_texture sum = {UNIT_FREE, run->ctx->sum.name, GL_SAMPLE_NEAREST};
+    struct pass_texture summed = {UNIT_FREE, sum->texture.name, GL_SAMPLE_NEAREST};
     return pass_screen(run,
         &(struct pass_screen){.name = "cascaded resolve",
             .body = "cascaded_resolve.glsl",
-            .textures = &sum,
+            .textures = &summed,
             .texture_count = 1,
             .tiles = tiles},
         error);

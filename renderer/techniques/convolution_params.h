@@ -1,7 +1,9 @@
 /* Rows and glue that the methods on convolution shadow maps share. */
 #pragma once
+#include "renderer/passes/draw/screen.h"
 #include "renderer/passes/map/classify.h"
 #include "renderer/passes/map/convolution.h"
+#include "renderer/passes/map/min_max.h"
 #include "renderer/techniques/map_params.h"
 #include <stdio.h>
 
@@ -40,8 +42,9 @@ static inline bool convolution_screen(struct technique_run *run,
     const struct shadow_input *series = pass_convolution(run, desc, error);
     const struct shadow_input *min_max =
         series ? pass_caster_min_max(run, desc->size, error) : NULL;
-    if (!min_max ||
-        (margin >= 0 && !pass_lit_tiles(run, desc->size, margin, 0, &pass.tiles, error)))
+    struct classify_desc classes = {
+        .map_size = desc->size, .margin_texels = margin, .one_window = true};
+    if (!min_max || (margin >= 0 && !pass_classify(run, &classes, &pass.tiles, error)))
         return false;
     bool tables = desc->format == CONVOLUTION_TABLES;
     enum gl_sampler_kind sampler = tables ? GL_SAMPLE_NEAREST : GL_SAMPLE_TRILINEAR;

@@ -1,5 +1,8 @@
 #include "renderer/passes/filter/interleave.h"
 #include "renderer/passes/filter/penumbra.h"
+#include "renderer/passes/map/depth_map.h"
+#include "renderer/passes/map/min_max.h"
+#include "renderer/passes/map/shadow_cache.h"
 #include "renderer/techniques/map_params.h"
 #include <math.h>
 #include <string.h>
@@ -41,6 +44,35 @@ static const struct pen_param rows[] = {
                 "a fraction of the distance to the camera; variant direct."),
 };
 
+enum { HARD, AXES, EDGES, LINES, ROUGH, SEEDS, SEEDS_NEXT, TARGETS };
+
+/* Screen-sized, from one pass of a light to the next. */
+struct state {
+    struct gl_target targets[TARGETS];
+};
+
+static void destroy(struct technique_ctx *ctx, void *data)
+{
+    struct state *state = data;
+    (void)ctx;
+    for (int i = 0; i < TARGETS; i++)
+        gl_target_destroy(&state->targets[i]);
+}
+
+static const struct gl_target *target(
+    const struct technique_run *run, int which, GLenum format, uint32_t levels)
+{
+    struct state *state = run->state;
+    gl_target_fit(&state->targets[which], format, run->width, run->height, 0, levels);
+    return &state->targets[which];
+}
+
+static GLuint texture(const struct technique_run *run, int which)
+{
+    const struct state *state = run->state;
+    return state->targets[which].texture.name;
+}
+
 /* What the two variants share of light space. */
 struct inputs {
     const struct shadow_input *map, *min_max;
@@ -59,28 +91,25 @@ static float depth_of(const struct light *light)
     return most;
 }
 
-/* Runs `body` over this face's receivers into a scratch texture. */
-static bool write_scratch(struct technique_run *run, enum pass_scratch_slot slot, const char *body,
+/* Runs `body` over this face's receivers into HARD or AXES. */
+static bool write_target(struct technique_run *run, int which, const char *body,
     const struct inputs *inputs, bool border, struct pen_error *error)
 {
-    const struct gl_texture *target = &run->ctx->scratch[slot];
-    GLuint framebuffer = gl_framebuffer_create(&target, 1, NULL);
+    const struct state *state = run->state;
     struct pass_texture pyramid = {
         UNIT_MIN_MAX, inputs->min_max->textures[0].name, GL_SAMPLE_NEAREST};
-    bool ok = pass_screen(run,
-        &(struct pass_screen){.name = slot == SCRATCH_HARD ? "hard shadows" : "penumbra axes",
+    return pass_screen(run,
+        &(struct pass_screen){.name = which == HARD ? "hard shadows" : "penumbra axes",
             .body = body,
             .defines = border ? "#define WITH_BORDER\n" : NULL,
             .shadow = &inputs->map->textures[0],
             .textures = &pyramid,
             .texture_count = 1,
             .tiles = inputs->tiles,
-            .framebuffer = framebuffer,
+            .framebuffer = state->targets[which].framebuffer,
             .extra = inputs->unit,
             .extra_bytes = sizeof inputs->unit},
         error);
-    gl.DeleteFramebuffers(1, &framebuffer);
-    return ok;
 }
 
 /* The hard shadow buffer. `border`: only this face's, with what lies beyond its border; otherwise
@@ -90,7 +119,7 @@ static bool write_hard(
 {
     static const float lit[4] = {1};
     const struct erosion *params = run->params;
-    const struct gl_texture *hard = pass_scratch(run, SCRATCH_HARD, GL_RGBA16F, 1);
+    const struct gl_target *hard = target(run, HARD, GL_RGBA16F, 1);
     memset(inputs, 0, sizeof *inputs);
     inputs->unit[0] = depth_of(run->light);
     inputs->map = pass_caster_map(run, params->map_size, error);
@@ -98,16 +127,16 @@ static bool write_hard(
     if (!inputs->min_max)
         return false;
     if (border || pass_is_first_face(run))
-        pass_scratch_clear(hard, lit);
+        gl_target_clear(hard, lit);
     return pass_penumbra_tiles(
-               run, inputs->min_max, params->min_filter + 1, hard, &inputs->tiles, error) &&
-           write_scratch(run, SCRATCH_HARD, "erosion_hard.glsl", inputs, border, error);
+               run, params->map_size, params->min_filter + 1, hard, &inputs->tiles, error) &&
+           write_target(run, HARD, "erosion_hard.glsl", inputs, border, error);
 }
 
 struct fill {
     const char *name, *fragment, *defines;
-    const struct gl_texture *target;
-    GLint target_level;
+    const struct gl_target *target; /* NULL: vis */
+    uint32_t target_level;
     struct pass_texture textures[8];
     uint32_t texture_count;
     int32_t block[4];
@@ -118,13 +147,12 @@ static bool fill(struct technique_run *run, const struct fill *f, struct pen_err
     GLuint framebuffer = run->vis_framebuffer;
     uint32_t width = run->width, height = run->height;
     if (f->target) {
-        gl.CreateFramebuffers(1, &framebuffer);
-        gl.NamedFramebufferTexture(
-            framebuffer, GL_COLOR_ATTACHMENT0, f->target->name, f->target_level);
+        gl_target_aim(f->target, f->target_level, 0);
+        framebuffer = f->target->framebuffer;
         width = width >> f->target_level ? width >> f->target_level : 1;
         height = height >> f->target_level ? height >> f->target_level : 1;
     }
-    bool ok = pass_fill(run->ctx,
+    return pass_fill(run->ctx,
         &(struct pass_fill){.name = f->name,
             .fragment = f->fragment,
             .defines = f->defines,
@@ -139,21 +167,18 @@ static bool fill(struct technique_run *run, const struct fill *f, struct pen_err
             .info = &run->technique->info,
             .params = run->params},
         error);
-    if (f->target)
-        gl.DeleteFramebuffers(1, &framebuffer);
-    return ok;
 }
 
-static bool build_edge_pyramid(struct technique_run *run, const struct gl_texture *hard,
-    const struct gl_texture *pyramid, struct pen_error *error)
+static bool build_edge_pyramid(
+    struct technique_run *run, const struct gl_target *pyramid, struct pen_error *error)
 {
-    for (uint32_t level = 0; level < pyramid->levels; level++) {
+    for (uint32_t level = 0; level < pyramid->texture.levels; level++) {
         struct fill f = {.name = level ? "edge pyramid" : "edges",
             .fragment = level ? "erosion_pyramid.frag" : "erosion_edges.frag",
             .defines = "#define PYRAMID\n",
             .target = pyramid,
-            .target_level = (GLint)level,
-            .textures = {{UNIT_FREE, level ? pyramid->name : hard->name, GL_SAMPLE_NEAREST}},
+            .target_level = level,
+            .textures = {{UNIT_FREE, texture(run, level ? EDGES : HARD), GL_SAMPLE_NEAREST}},
             .texture_count = 1,
             .block = {(int32_t)level - 1}};
         if (!fill(run, &f, error))
@@ -165,15 +190,14 @@ static bool build_edge_pyramid(struct technique_run *run, const struct gl_textur
 static bool record_pcf(struct technique_run *run, struct pen_error *error)
 {
     const struct erosion *params = run->params;
-    const struct gl_texture *hard = pass_scratch(run, SCRATCH_HARD, GL_RGBA16F, 1);
-    const struct gl_texture *pyramid = pass_scratch(run, SCRATCH_EDGES, GL_RGBA16F, 0);
+    const struct gl_target *pyramid = target(run, EDGES, GL_RGBA16F, 0);
     struct inputs inputs;
     /* Each face filters its own receivers in its own map, so it needs its own edges, also those
      * that lie beyond its border. */
-    if (!write_hard(run, &inputs, true, error) || !build_edge_pyramid(run, hard, pyramid, error))
+    if (!write_hard(run, &inputs, true, error) || !build_edge_pyramid(run, pyramid, error))
         return false;
-    struct pass_texture textures[] = {{UNIT_FREE, hard->name, GL_SAMPLE_NEAREST},
-        {UNIT_FREE + 1, pyramid->name, GL_SAMPLE_TRILINEAR}};
+    struct pass_texture textures[] = {{UNIT_FREE, texture(run, HARD), GL_SAMPLE_NEAREST},
+        {UNIT_FREE + 1, texture(run, EDGES), GL_SAMPLE_TRILINEAR}};
     struct pass_screen pass = {.name = "erosion",
         .body = "erosion.glsl",
         .shadow = &inputs.map->textures[0],
@@ -189,38 +213,32 @@ static bool record_pcf(struct technique_run *run, struct pen_error *error)
 
 static bool fit_lines(struct technique_run *run, struct pen_error *error)
 {
-    const struct gl_texture *scratch = run->ctx->scratch;
-    const struct gl_texture *edges = pass_scratch(run, SCRATCH_ALL, GL_RG16F, 1);
-    const struct gl_texture *rough = pass_scratch(run, SCRATCH_ALL_NEXT, GL_RGBA16F, 1);
-    const struct gl_texture *lines = pass_scratch(run, SCRATCH_LINES, GL_RGBA16F, 1);
     struct fill find = {.name = "edges",
         .fragment = "erosion_edges.frag",
-        .target = edges,
-        .textures = {{UNIT_FREE, scratch[SCRATCH_HARD].name, GL_SAMPLE_NEAREST}},
+        .target = target(run, EDGES, GL_RG16F, 1),
+        .textures = {{UNIT_FREE, texture(run, HARD), GL_SAMPLE_NEAREST}},
         .texture_count = 1};
     struct fill fit = {.name = "line fit",
         .fragment = "erosion_lines.frag",
-        .target = rough,
-        .textures = {{UNIT_FREE, edges->name, GL_SAMPLE_NEAREST}},
+        .target = target(run, ROUGH, GL_RGBA16F, 1),
+        .textures = {{UNIT_FREE, texture(run, EDGES), GL_SAMPLE_NEAREST}},
         .texture_count = 1};
     struct fill smooth = {.name = "line fit",
         .fragment = "erosion_smooth.frag",
-        .target = lines,
-        .textures = {{UNIT_FREE, rough->name, GL_SAMPLE_NEAREST}},
+        .target = target(run, LINES, GL_RGBA16F, 1),
+        .textures = {{UNIT_FREE, texture(run, ROUGH), GL_SAMPLE_NEAREST}},
         .texture_count = 1};
     return fill(run, &find, error) && fill(run, &fit, error) && fill(run, &smooth, error);
 }
 
-static bool flood(
-    struct technique_run *run, const struct gl_texture **seeds, struct pen_error *error)
+static bool flood(struct technique_run *run, GLuint *seeds, struct pen_error *error)
 {
     const struct erosion *params = run->params;
-    const struct gl_texture *scratch = run->ctx->scratch;
-    const struct gl_texture *pair[2] = {pass_scratch(run, SCRATCH_LIT, GL_RG16F, 1),
-        pass_scratch(run, SCRATCH_LIT_NEXT, GL_RG16F, 1)};
+    const struct gl_target *pair[2] = {
+        target(run, SEEDS, GL_RG16F, 1), target(run, SEEDS_NEXT, GL_RG16F, 1)};
     static const float none[4] = {1e4f, 1e4f}; /* FAR in erosion_line.glsl */
-    pass_scratch_clear(pair[0], none);
-    pass_scratch_clear(pair[1], none);
+    gl_target_clear(pair[0], none);
+    gl_target_clear(pair[1], none);
     int32_t step = 1;
     while (2 * step < (int32_t)params->max_radius)
         step *= 2;
@@ -229,43 +247,42 @@ static bool flood(
             .fragment = "erosion_flood.frag",
             .defines = i ? NULL : "#define FIRST\n",
             .target = pair[i & 1],
-            .textures = {{UNIT_DEPTH, run->gbuffer->depth.name, GL_SAMPLE_NEAREST},
-                {UNIT_NORMAL, run->gbuffer->normal.name, GL_SAMPLE_NEAREST},
-                {UNIT_FREE, scratch[SCRATCH_HARD].name, GL_SAMPLE_NEAREST},
-                {UNIT_FREE + 1, scratch[SCRATCH_AXES].name, GL_SAMPLE_NEAREST},
-                {UNIT_FREE + 2, scratch[SCRATCH_LINES].name, GL_SAMPLE_NEAREST},
-                {UNIT_FREE + 3, pair[~i & 1]->name, GL_SAMPLE_NEAREST}},
+            .textures = {{UNIT_DEPTH, run->gbuffer->depth.texture.name, GL_SAMPLE_NEAREST},
+                {UNIT_NORMAL, run->gbuffer->normal.texture.name, GL_SAMPLE_NEAREST},
+                {UNIT_FREE, texture(run, HARD), GL_SAMPLE_NEAREST},
+                {UNIT_FREE + 1, texture(run, AXES), GL_SAMPLE_NEAREST},
+                {UNIT_FREE + 2, texture(run, LINES), GL_SAMPLE_NEAREST},
+                {UNIT_FREE + 3, pair[~i & 1]->texture.name, GL_SAMPLE_NEAREST}},
             .texture_count = i ? 6 : 5,
             .block = {step}};
         if (!fill(run, &f, error))
             return false;
-        *seeds = pair[i & 1];
+        *seeds = pair[i & 1]->texture.name;
     }
     return true;
 }
 
 static bool record_direct(struct technique_run *run, struct pen_error *error)
 {
-    const struct gl_texture *hard = pass_scratch(run, SCRATCH_HARD, GL_RGBA16F, 1);
-    const struct gl_texture *axes = pass_scratch(run, SCRATCH_AXES, GL_RGBA16F, 1);
+    target(run, AXES, GL_RGBA16F, 1);
     struct inputs inputs;
     if (!write_hard(run, &inputs, false, error) ||
-        !write_scratch(run, SCRATCH_AXES, "erosion_axes.glsl", &inputs, false, error))
+        !write_target(run, AXES, "erosion_axes.glsl", &inputs, false, error))
         return false;
     /* From here on nothing is left of light space: edges run on from face to face. */
     if (!pass_is_last_face(run))
         return true;
-    const struct gl_texture *seeds = NULL;
+    GLuint seeds = 0;
     if (!fit_lines(run, error) || !flood(run, &seeds, error))
         return false;
     struct fill f = {.name = "erosion",
         .fragment = "erosion_direct.frag",
-        .textures = {{UNIT_DEPTH, run->gbuffer->depth.name, GL_SAMPLE_NEAREST},
-            {UNIT_NORMAL, run->gbuffer->normal.name, GL_SAMPLE_NEAREST},
-            {UNIT_FREE, hard->name, GL_SAMPLE_NEAREST},
-            {UNIT_FREE + 1, axes->name, GL_SAMPLE_NEAREST},
-            {UNIT_FREE + 2, run->ctx->scratch[SCRATCH_LINES].name, GL_SAMPLE_NEAREST},
-            {UNIT_FREE + 3, seeds->name, GL_SAMPLE_NEAREST}},
+        .textures = {{UNIT_DEPTH, run->gbuffer->depth.texture.name, GL_SAMPLE_NEAREST},
+            {UNIT_NORMAL, run->gbuffer->normal.texture.name, GL_SAMPLE_NEAREST},
+            {UNIT_FREE, texture(run, HARD), GL_SAMPLE_NEAREST},
+            {UNIT_FREE + 1, texture(run, AXES), GL_SAMPLE_NEAREST},
+            {UNIT_FREE + 2, texture(run, LINES), GL_SAMPLE_NEAREST},
+            {UNIT_FREE + 3, seeds, GL_SAMPLE_NEAREST}},
         .texture_count = 6};
     return fill(run, &f, error);
 }
@@ -290,5 +307,7 @@ const struct technique technique_erosion = {
         .textured = false,
         .struct_size = sizeof(struct erosion),
         .params = {rows, sizeof rows / sizeof *rows}},
+    .state_size = sizeof(struct state),
     .record = record,
+    .destroy = destroy,
 };

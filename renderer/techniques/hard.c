@@ -1,4 +1,6 @@
-#include "renderer/passes/draw/passes.h"
+#include "renderer/passes/draw/screen.h"
+#include "renderer/passes/map/depth_map.h"
+#include "renderer/passes/map/shadow_cache.h"
 #include "renderer/techniques/map_params.h"
 
 struct hard {

@@ -1,5 +1,6 @@
 /* Rows and glue that the methods on a blurred moment map share. */
 #pragma once
+#include "renderer/passes/draw/screen.h"
 #include "renderer/passes/map/moments.h"
 #include "renderer/techniques/map_params.h"
 

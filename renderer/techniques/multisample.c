@@ -1,4 +1,4 @@
-#include "renderer/passes/draw/passes.h"
+#include "renderer/passes/draw/screen.h"
 #include "renderer/passes/light/sample_maps.h"
 #include "renderer/techniques/map_params.h"
 #include <string.h>
@@ -30,7 +30,7 @@ struct lookup_block {
 };
 
 static bool add_batch(struct technique_run *run, const struct sample_point *points, uint32_t first,
-    uint32_t count, bool keep, struct pen_error *error)
+    uint32_t count, bool keep, const struct gl_target *sum, struct pen_error *error)
 {
     const struct multisample *params = run->params;
     struct lookup_block block = {
@@ -45,7 +45,7 @@ static bool add_batch(struct technique_run *run, const struct sample_point *poin
             .body = "multisample.glsl",
             .textures = &texture,
             .texture_count = 1,
-            .framebuffer = run->ctx->sum_framebuffer,
+            .framebuffer = sum->framebuffer,
             .add = true,
             .extra = &block,
             .extra_bytes = sizeof block},
@@ -59,18 +59,18 @@ static bool record(struct technique_run *run, struct pen_error *error)
     sample_points(run->face, params->samples, points);
     uint64_t bytes = (uint64_t)params->samples * params->map_size * params->map_size * 4;
     bool keep = bytes <= run->ctx->shadow_budget;
-    pass_clear_sum(run);
+    const struct gl_target *sum = pass_sum(run);
     for (uint32_t first = 0; first < params->samples; first += SAMPLE_MAP_BATCH) {
         uint32_t left = params->samples - first;
         uint32_t n = left < SAMPLE_MAP_BATCH ? left : SAMPLE_MAP_BATCH;
-        if (!add_batch(run, points, first, n, keep, error))
+        if (!add_batch(run, points, first, n, keep, sum, error))
             return false;
     }
-    struct pass_texture sum = {UNIT_FREE, run->ctx->sum.name, GL_SAMPLE_NEAREST};
+    struct pass_texture summed = {UNIT_FREE, sum->texture.name, GL_SAMPLE_NEAREST};
     return pass_screen(run,
         &(struct pass_screen){.name = "multisample resolve",
             .body = "multisample_resolve.glsl",
-            .textures = &sum,
+            .textures = &summed,
             .texture_count = 1},
         error);
 }

@@ -30,13 +30,8 @@ static const char *const patch_fill_names[] = {"none", "extend", "join", NULL};
 static inline bool patch_tiles(struct technique_run *run, uint32_t map_size, float min_filter,
     bool umbra, const struct gl_texture **tiles, struct pen_error *error)
 {
-    *tiles = NULL;
-    if (!run->request->classify.on)
-        return true;
-    const struct shadow_input *min_max = pass_caster_min_max(run, map_size, error);
-    if (!min_max)
-        return false;
-    *tiles = umbra ? pass_classify(run, min_max, min_filter + 1, error)
-                   : pass_classify_lit(run, min_max, min_filter + 1, error);
-    return *tiles != NULL;
+    return pass_classify(run,
+        &(struct classify_desc){
+            .map_size = map_size, .margin_texels = min_filter + 1, .umbra = umbra},
+        tiles, error);
 }

@@ -1,5 +1,7 @@
+#include "renderer/passes/draw/screen.h"
 #include "renderer/passes/map/classify.h"
-#include "renderer/passes/draw/passes.h"
+#include "renderer/passes/map/depth_map.h"
+#include "renderer/passes/map/shadow_cache.h"
 #include "renderer/techniques/map_params.h"
 
 struct pcf {
@@ -23,12 +25,11 @@ static bool record(struct technique_run *run, struct pen_error *error)
     const struct shadow_input *map = pass_caster_map(run, params->map_size, error);
     if (!map)
         return false;
-    const struct gl_texture *tiles = NULL;
-    if (run->request->classify.on) {
-        const struct shadow_input *min_max = pass_caster_min_max(run, params->map_size, error);
-        if (!min_max || !(tiles = pass_classify(run, min_max, params->radius + 2, error)))
-            return false;
-    }
+    struct classify_desc classes = {
+        .map_size = params->map_size, .margin_texels = params->radius + 2, .umbra = true};
+    const struct gl_texture *tiles;
+    if (!pass_classify(run, &classes, &tiles, error))
+        return false;
     return pass_screen(run,
         &(struct pass_screen){
             .name = "pcf", .body = "pcf.glsl", .shadow = &map->textures[0], .tiles = tiles},

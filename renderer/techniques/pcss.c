@@ -1,6 +1,8 @@
 #include "renderer/passes/map/classify.h"
 #include "renderer/passes/filter/interleave.h"
-#include "renderer/passes/draw/passes.h"
+#include "renderer/passes/map/depth_map.h"
+#include "renderer/passes/map/min_max.h"
+#include "renderer/passes/map/shadow_cache.h"
 #include "renderer/techniques/map_params.h"
 
 struct pcss {
@@ -33,9 +35,10 @@ static bool record(struct technique_run *run, struct pen_error *error)
     if (!map || !min_max)
         return false;
     struct pass_texture pyramid = {UNIT_MIN_MAX, min_max->textures[0].name, GL_SAMPLE_NEAREST};
-    const struct gl_texture *tiles = NULL;
-    if (run->request->classify.on &&
-        !(tiles = pass_classify(run, min_max, params->min_filter + 1, error)))
+    struct classify_desc classes = {
+        .map_size = params->map_size, .margin_texels = params->min_filter + 1, .umbra = true};
+    const struct gl_texture *tiles;
+    if (!pass_classify(run, &classes, &tiles, error))
         return false;
     struct pass_screen pass = {.name = "pcss",
         .body = "pcss.glsl",

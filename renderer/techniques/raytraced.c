@@ -1,3 +1,4 @@
+#include "renderer/passes/draw/screen.h"
 #include "renderer/passes/rays/rays.h"
 
 static const char *const weighting_names[] = {"area", "g", NULL};
@@ -62,7 +63,7 @@ static bool trace(struct technique_run *run, struct pen_error *error)
     struct pen_error refused = {0};
 #ifdef PENUMBRA_HAVE_TRACE
     bool automatic = params->backend == BACKEND_AUTO;
-    if (params->backend == BACKEND_CPU || (automatic && run->ctx->device.software))
+    if (params->backend == BACKEND_CPU || (automatic && run->ctx->software))
         return pass_rays_host(run, &job, &s->targets, error);
 #endif
     if (pass_rays_device(run, &job, &s->targets, &refused))
@@ -83,8 +84,9 @@ static bool record(struct technique_run *run, struct pen_error *error)
     if (run->face == &run->light->faces[0] && !trace(run, error))
         return false;
     run->work_counted = true;
-    struct pass_texture traced[] = {{UNIT_FREE, s->targets.visibility.name, GL_SAMPLE_NEAREST},
-        {UNIT_FREE + 1, s->targets.standard_error.name, GL_SAMPLE_NEAREST}};
+    struct pass_texture traced[] = {
+        {UNIT_FREE, s->targets.visibility.texture.name, GL_SAMPLE_NEAREST},
+        {UNIT_FREE + 1, s->targets.standard_error.texture.name, GL_SAMPLE_NEAREST}};
     struct pass_screen resolve = {
         .name = "trace resolve", .body = "raytraced.glsl", .textures = traced, .texture_count = 2};
     if (!pass_screen(run, &resolve, error))

@@ -1,6 +1,8 @@
 /* Rows and glue that the methods on a summed-area table of moments share. */
 #pragma once
+#include "renderer/passes/draw/screen.h"
 #include "renderer/passes/map/classify.h"
+#include "renderer/passes/map/min_max.h"
 #include "renderer/passes/map/sat.h"
 #include "renderer/techniques/map_params.h"
 
@@ -23,7 +25,9 @@ static inline bool sat_prepare(struct technique_run *run, const struct sat_table
 {
     const struct shadow_input *min_max = pass_min_max(run, table->map_size, error);
     const struct shadow_input *sat = min_max ? pass_sat(run, table, &lookup->block, error) : NULL;
-    if (!sat || !pass_lit_tiles(run, table->map_size, min_filter + 1, 0, &lookup->tiles, error))
+    struct classify_desc classes = {
+        .map_size = table->map_size, .margin_texels = min_filter + 1, .one_window = true};
+    if (!sat || !pass_classify(run, &classes, &lookup->tiles, error))
         return false;
     lookup->textures[0] =
         (struct pass_texture){UNIT_FREE + 1, sat->textures[0].name, GL_SAMPLE_NEAREST};

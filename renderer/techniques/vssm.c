@@ -1,4 +1,5 @@
 #include "renderer/passes/filter/interleave.h"
+#include "renderer/passes/map/depth_map.h"
 #include "renderer/techniques/sat_params.h"
 
 static const char *const subdivide_names[] = {"quadtree", "uniform", "off", NULL};

@@ -7,14 +7,16 @@ bool compute_begin(struct technique_ctx *ctx, struct gl_context **context)
 {
     struct pen_error error = {0};
     struct pen_device_config config = {.debug = true};
-    *context = gl_context_create(&config, &ctx->device, &error);
+    struct pen_device_info device;
+    *context = gl_context_create(&config, &device, &error);
     if (!*context) {
         fprintf(stderr, "skipped: %s\n", error.message);
         return false;
     }
     ctx->programs = gl_programs_create(0);
     gl_samplers_init(&ctx->samplers);
-    gl_timer_init(&ctx->timer, ctx->device.software);
+    ctx->software = device.software;
+    gl_timer_init(&ctx->timer, ctx->software);
     gl.CreateVertexArrays(1, &ctx->empty_array);
     return true;
 }

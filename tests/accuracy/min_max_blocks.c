@@ -1,5 +1,5 @@
 /* Every cell of the min-max pyramid against the texels of the map that it stands for. */
-#include "renderer/passes/draw/passes.h"
+#include "renderer/passes/map/min_max.h"
 #include "tests/accuracy/compute.h"
 #include "tests/unit/check.h"
 #include <math.h>

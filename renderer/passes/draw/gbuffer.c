@@ -1,23 +1,24 @@
-#include "renderer/passes/draw/passes.h"
+#include "renderer/passes/draw/gbuffer.h"
 #include <string.h>
 
 static void fit(struct gbuffer *g, uint32_t width, uint32_t height, bool emission)
 {
-    bool made = gl_texture_fit(&g->depth, GL_DEPTH_COMPONENT32F, width, height, 0, 1);
-    made |= gl_texture_fit(&g->normal, GL_RGBA16, width, height, 0, 1);
-    made |= gl_texture_fit(&g->albedo, GL_RGBA8, width, height, 0, 1);
-    made |= gl_texture_fit(&g->surface, GL_RGBA8, width, height, 0, 1);
+    bool made = gl_target_fit(&g->depth, GL_DEPTH_COMPONENT32F, width, height, 0, 1);
+    made |= gl_target_fit(&g->normal, GL_RGBA16, width, height, 0, 1);
+    made |= gl_target_fit(&g->albedo, GL_RGBA8, width, height, 0, 1);
+    made |= gl_target_fit(&g->surface, GL_RGBA8, width, height, 0, 1);
     if (emission)
-        made |= gl_texture_fit(&g->emission, GL_R11F_G11F_B10F, width, height, 0, 1);
-    else if (g->emission.name) {
-        gl_texture_destroy(&g->emission);
+        made |= gl_target_fit(&g->emission, GL_R11F_G11F_B10F, width, height, 0, 1);
+    else if (g->emission.texture.name) {
+        gl_target_destroy(&g->emission);
         made = true;
     }
     if (!made && g->framebuffer)
         return;
     gl.DeleteFramebuffers(1, &g->framebuffer);
-    const struct gl_texture *colors[] = {&g->normal, &g->albedo, &g->surface, &g->emission};
-    g->framebuffer = gl_framebuffer_create(colors, emission ? 4 : 3, &g->depth);
+    const struct gl_texture *colors[] = {
+        &g->normal.texture, &g->albedo.texture, &g->surface.texture, &g->emission.texture};
+    g->framebuffer = gl_framebuffer_create(colors, emission ? 4 : 3, &g->depth.texture);
 }
 
 static GLuint program(struct technique_ctx *ctx, const char *defines, struct pen_error *error)

@@ -1,3 +1,4 @@
+#include "renderer/passes/draw/screen.h"
 #include "renderer/passes/draw/passes.h"
 #include "renderer/passes/map/classify.h"
 #include <stdio.h>
@@ -84,8 +85,8 @@ bool pass_screen(struct technique_run *run, const struct pass_screen *pass, stru
     if (!program)
         return false;
     gl_timer_begin(&ctx->timer, PEN_STAGE_TECHNIQUE, pass->name);
-    gl.BindTextureUnit(UNIT_DEPTH, run->gbuffer->depth.name);
-    gl.BindTextureUnit(UNIT_NORMAL, run->gbuffer->normal.name);
+    gl.BindTextureUnit(UNIT_DEPTH, run->gbuffer->depth.texture.name);
+    gl.BindTextureUnit(UNIT_NORMAL, run->gbuffer->normal.texture.name);
     gl.BindTextureUnit(UNIT_EMISSION, run->emission->name);
     gl.BindSampler(UNIT_EMISSION, ctx->samplers.names[GL_SAMPLE_TRILINEAR]);
     if (pass->shadow) {
@@ -128,16 +129,22 @@ bool pass_fill(struct technique_ctx *ctx, const struct pass_fill *pass, struct p
     return true;
 }
 
-GLuint pass_clear_sum(struct technique_run *run)
+const struct gl_target *pass_sum(struct technique_run *run)
 {
+    static const struct pass_targets key = {1};
     static const float zero[4] = {0};
-    struct technique_ctx *ctx = run->ctx;
-    if (gl_texture_fit(&ctx->sum, GL_RGBA32F, run->width, run->height, 0, 1) ||
-        !ctx->sum_framebuffer) {
-        gl.DeleteFramebuffers(1, &ctx->sum_framebuffer);
-        const struct gl_texture *color = &ctx->sum;
-        ctx->sum_framebuffer = gl_framebuffer_create(&color, 1, NULL);
-    }
-    gl.ClearNamedFramebufferfv(ctx->sum_framebuffer, GL_COLOR, 0, zero);
-    return ctx->sum_framebuffer;
+    struct gl_target *sum = pass_targets(run->ctx, &key);
+    gl_target_fit(sum, GL_RGBA32F, run->width, run->height, 0, 1);
+    gl_target_clear(sum, zero);
+    return sum;
+}
+
+bool pass_is_first_face(const struct technique_run *run)
+{
+    return run->face == run->light->faces;
+}
+
+bool pass_is_last_face(const struct technique_run *run)
+{
+    return run->face == run->light->faces + run->light->face_count - 1;
 }

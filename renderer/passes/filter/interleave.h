@@ -1,7 +1,7 @@
 /* Interleaved sampling (Keller and Heidrich 2001): neighbouring pixels use different taps, and a
  * 4 x 4 average over the same surface makes one large kernel of them. */
 #pragma once
-#include "renderer/passes/draw/passes.h"
+#include "renderer/passes/draw/screen.h"
 
 /* Runs `pass` with INTERLEAVED defined: its visibility() returns (V, width of the penumbra in
  * pixels, 0, 1). Where the penumbra is narrower than the 4 x 4 block the average fades out, so that

@@ -13,25 +13,24 @@ static bool look_up(struct technique_run *run, const struct sample_block *block,
     const struct gl_texture *maps, bool sparse, bool emitted, struct pen_error *error)
 {
     struct pass_texture textures[] = {{UNIT_FREE, maps->name, GL_SAMPLE_NEAREST_BORDER},
-        {UNIT_FREE + 1, run->ctx->scratch[SCRATCH_SPREAD].name, GL_SAMPLE_NEAREST}};
-    const struct gl_texture *target = &run->ctx->scratch[emitted ? SCRATCH_ALL : SCRATCH_LIT];
-    GLuint framebuffer = gl_framebuffer_create(&target, 1, NULL);
+        {UNIT_FREE + 1, pass_penumbra_target(run, PENUMBRA_SPREAD)->texture.name,
+            GL_SAMPLE_NEAREST}};
+    const struct gl_target *target =
+        pass_penumbra_target(run, emitted ? PENUMBRA_ALL : PENUMBRA_LIT);
     char defines[64];
     snprintf(defines, sizeof defines, "%s%s", sparse ? "#define SPARSE\n" : "",
         emitted ? "#define EMITTED\n" : "");
-    bool ok = pass_screen(run,
+    return pass_screen(run,
         &(struct pass_screen){.name = emitted ? "light samples, unshadowed" : "light samples",
             .body = "light_samples.glsl",
             .defines = defines,
             .textures = textures,
             .texture_count = 2,
-            .framebuffer = framebuffer,
+            .framebuffer = target->framebuffer,
             .add = block->range[1] > 0, /* the first batch replaces what the target starts as */
             .extra = block,
             .extra_bytes = sizeof *block},
         error);
-    gl.DeleteFramebuffers(1, &framebuffer);
-    return ok;
 }
 
 bool pass_light_samples(struct technique_run *run, uint32_t maps, uint32_t map_size,

@@ -6,9 +6,9 @@
 
 #define LIGHT_SAMPLES_MOST 64
 
-/* Fills SCRATCH_LIT and, under a textured light, SCRATCH_ALL for this face's receivers; wants
- * pass_penumbra_spread first. `maps` points of the light are used, at most
- * LIGHT_SAMPLES_MOST, of which every pixel takes `per_pixel`: all of them, or, when fewer,
- * P(samples) others than its neighbours. */
+/* Fills PENUMBRA_LIT and, under a textured light, PENUMBRA_ALL for this face's receivers; wants
+ * pass_penumbra_spread first. `maps` points of the light are used, at most LIGHT_SAMPLES_MOST, of
+ * which every pixel takes `per_pixel`: all of them, or, when fewer, P(samples) others than its
+ * neighbours. */
 bool pass_light_samples(struct technique_run *run, uint32_t maps, uint32_t map_size,
     uint32_t per_pixel, struct pen_error *error);

@@ -1,25 +1,41 @@
 #include "renderer/passes/filter/penumbra.h"
+#include "renderer/passes/draw/passes.h"
 #include "renderer/passes/map/classify.h"
+#include "renderer/passes/map/depth_map.h"
+#include "renderer/passes/map/min_max.h"
 #include <stdio.h>
 
-bool pass_penumbra_tiles(struct technique_run *run, const struct shadow_input *casters,
-    float margin_texels, const struct gl_texture *scratch, const struct gl_texture **tiles,
-    struct pen_error *error)
+static struct gl_target *targets(struct technique_run *run)
 {
-    struct gl_program_desc desc = {.vertex = "tiles.vert",
+    static const struct pass_targets key = {PENUMBRA_TARGETS};
+    return pass_targets(run->ctx, &key);
+}
+
+const struct gl_target *pass_penumbra_target(struct technique_run *run, enum penumbra_target which)
+{
+    return &targets(run)[which];
+}
+
+bool pass_penumbra_tiles(struct technique_run *run, uint32_t map_size, float margin_texels,
+    const struct gl_target *spread, const struct gl_texture **tiles, struct pen_error *error)
+{
+    struct gl_program_desc program_desc = {.vertex = "tiles.vert",
         .fragment = "constant.frag",
         .defines = "#define CONSTANT vec4(0.0, 0.0, 0.0, 0.001)\n"};
-    *tiles = NULL;
-    if (!run->request->classify.on)
-        return true;
-    GLuint program = gl_programs_get(run->ctx->programs, &desc, error);
-    if (!program || !(*tiles = pass_classify_screen(run, casters, margin_texels, error)))
+    struct classify_desc desc = {.map_size = map_size,
+        .margin_texels = margin_texels,
+        .umbra = true,
+        .one_window = true,
+        .seams = true};
+    if (!pass_classify(run, &desc, tiles, error))
         return false;
-    GLuint framebuffer = gl_framebuffer_create(&scratch, 1, NULL);
-    pass_draw_tiles(
-        run->ctx, program, framebuffer, *tiles, TILE_UMBRA, run->width, run->height, false);
-    gl.DeleteFramebuffers(1, &framebuffer);
-    return true;
+    if (!*tiles)
+        return true;
+    GLuint program = gl_programs_get(run->ctx->programs, &program_desc, error);
+    if (program)
+        pass_draw_tiles(run->ctx, program, spread->framebuffer, *tiles, TILE_UMBRA, run->width,
+            run->height, false);
+    return program != 0;
 }
 
 bool pass_penumbra_spread(
@@ -30,25 +46,23 @@ bool pass_penumbra_spread(
     const struct shadow_input *min_max = map ? pass_caster_min_max(run, map_size, error) : NULL;
     if (!min_max)
         return false;
-    const struct gl_texture *spread = pass_scratch(run, SCRATCH_SPREAD, GL_RGBA16F, 1);
+    struct gl_target *spread = &targets(run)[PENUMBRA_SPREAD];
+    gl_target_fit(spread, GL_RGBA16F, run->width, run->height, 0, 1);
     if (pass_is_first_face(run))
-        pass_scratch_clear(spread, lit);
+        gl_target_clear(spread, lit);
     const struct gl_texture *tiles;
-    if (!pass_penumbra_tiles(run, min_max, min_filter + 1, spread, &tiles, error))
+    if (!pass_penumbra_tiles(run, map_size, min_filter + 1, spread, &tiles, error))
         return false;
-    GLuint framebuffer = gl_framebuffer_create(&spread, 1, NULL);
     struct pass_texture pyramid = {UNIT_MIN_MAX, min_max->textures[0].name, GL_SAMPLE_NEAREST};
-    bool ok = pass_screen(run,
+    return pass_screen(run,
         &(struct pass_screen){.name = "penumbra size",
             .body = "penumbra_estimate.glsl",
             .shadow = &map->textures[0],
             .textures = &pyramid,
             .texture_count = 1,
             .tiles = tiles,
-            .framebuffer = framebuffer},
+            .framebuffer = spread->framebuffer},
         error);
-    gl.DeleteFramebuffers(1, &framebuffer);
-    return ok;
 }
 
 /* One filter pass from a pair of scratch textures to the next pair, or to vis. */
@@ -71,21 +85,23 @@ void pass_penumbra_start(struct technique_run *run, bool next)
     const float *mean = run->face->emission_mean;
     const float lit[4] = {
         textured ? mean[0] : 1, textured ? mean[1] : 1, textured ? mean[2] : 1, 1};
-    int slot = next ? SCRATCH_LIT_NEXT : SCRATCH_LIT;
-    for (int i = 0; i < (textured ? 2 : 1); i++)
-        pass_scratch_clear(pass_scratch(run, slot + i, textured ? GL_RGBA16F : GL_RG16F, 1), lit);
+    struct gl_target *pair = &targets(run)[next ? PENUMBRA_LIT_NEXT : PENUMBRA_LIT];
+    for (int i = 0; i < (textured ? 2 : 1); i++) {
+        gl_target_fit(&pair[i], textured ? GL_RGBA16F : GL_RG16F, run->width, run->height, 0, 1);
+        gl_target_clear(&pair[i], lit);
+    }
 }
 
 static GLuint make_target(struct technique_run *run, bool next)
 {
-    struct gl_texture *first = &run->ctx->scratch[next ? SCRATCH_LIT_NEXT : SCRATCH_LIT];
-    const struct gl_texture *targets[2] = {first, first + 1};
-    return gl_framebuffer_create(targets, is_textured(run) ? 2 : 1, NULL);
+    const struct gl_target *pair = &targets(run)[next ? PENUMBRA_LIT_NEXT : PENUMBRA_LIT];
+    const struct gl_texture *textures[2] = {&pair[0].texture, &pair[1].texture};
+    return gl_framebuffer_create(textures, is_textured(run) ? 2 : 1, NULL);
 }
 
 static bool filter(struct technique_run *run, const struct step *step, struct pen_error *error)
 {
-    struct technique_ctx *ctx = run->ctx;
+    const struct gl_target *all = targets(run);
     char defines[256];
     bool hard = step->source == PENUMBRA_HARD;
     snprintf(defines, sizeof defines, "#define LIGHT_SHAPE %d\n#define LIGHT_PARALLEL %d\n%s%s%s%s",
@@ -96,13 +112,14 @@ static bool filter(struct technique_run *run, const struct step *step, struct pe
         pass_penumbra_start(run, !step->from_next);
         framebuffer = make_target(run, !step->from_next);
     }
-    int base = step->from_next ? SCRATCH_LIT_NEXT : SCRATCH_LIT;
-    struct pass_texture textures[] = {{UNIT_DEPTH, run->gbuffer->depth.name, GL_SAMPLE_NEAREST},
-        {UNIT_NORMAL, run->gbuffer->normal.name, GL_SAMPLE_NEAREST},
-        {UNIT_FREE, ctx->scratch[SCRATCH_SPREAD].name, GL_SAMPLE_NEAREST},
-        {UNIT_FREE + 1, ctx->scratch[base].name, GL_SAMPLE_NEAREST},
-        {UNIT_FREE + 2, ctx->scratch[base + 1].name, GL_SAMPLE_NEAREST}};
-    bool ok = pass_fill(ctx,
+    int base = step->from_next ? PENUMBRA_LIT_NEXT : PENUMBRA_LIT;
+    struct pass_texture textures[] = {
+        {UNIT_DEPTH, run->gbuffer->depth.texture.name, GL_SAMPLE_NEAREST},
+        {UNIT_NORMAL, run->gbuffer->normal.texture.name, GL_SAMPLE_NEAREST},
+        {UNIT_FREE, all[PENUMBRA_SPREAD].texture.name, GL_SAMPLE_NEAREST},
+        {UNIT_FREE + 1, all[base].texture.name, GL_SAMPLE_NEAREST},
+        {UNIT_FREE + 2, all[base + 1].texture.name, GL_SAMPLE_NEAREST}};
+    bool ok = pass_fill(run->ctx,
         &(struct pass_fill){.name = step->name,
             .fragment = step->fragment,
             .defines = defines,

@@ -1,4 +1,5 @@
 #include "renderer/passes/light/emission_sat.h"
+#include "renderer/passes/draw/screen.h"
 #include <string.h>
 
 static bool sum(struct technique_run *run, const struct gl_texture *target,

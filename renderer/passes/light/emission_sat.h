@@ -1,6 +1,6 @@
 /* Sums of a light's emission over rectangles of the emitter (Crow 1984). */
 #pragma once
-#include "renderer/passes/draw/passes.h"
+#include "renderer/passes/map/shadow_cache.h"
 
 #define EMISSION_SAT_CELLS 128
 

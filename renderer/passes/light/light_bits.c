@@ -1,5 +1,6 @@
 #include "renderer/passes/light/light_bits.h"
 #include "protocol/memory.h"
+#include "renderer/light/light.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

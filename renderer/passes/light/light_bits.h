@@ -2,7 +2,7 @@
  * coordinate come from a table, so that any set of points costs the same: the bits of a rectangle
  * are four lookups. */
 #pragma once
-#include "renderer/passes/draw/passes.h"
+#include "renderer/gl/texture.h"
 
 #define LIGHT_BITS_STEPS 512   /* of a coordinate from -1 to 1 */
 #define LIGHT_BITS_PATTERNS 16 /* jittered sets, one per pixel of a 4 x 4 block */

@@ -1,4 +1,7 @@
 #include "renderer/passes/light/sample_maps.h"
+#include "renderer/passes/draw/passes.h"
+#include "renderer/passes/map/depth_map.h"
+#include "renderer/passes/map/shadow_cache.h"
 #include <assert.h>
 #include <math.h>
 #include <string.h>
@@ -141,10 +144,11 @@ bool pass_sample_maps(struct technique_run *run, const struct sample_point *poin
         *maps = input ? &input->textures[0] : NULL;
         return input != NULL;
     }
-    struct gl_texture *scratch = &run->ctx->sample_scratch;
-    gl_texture_fit(scratch, GL_DEPTH_COMPONENT32F, size, size, SAMPLE_MAP_BATCH, 1);
-    *maps = scratch;
-    return draw_layers(run, points, count, ~0u, scratch, error);
+    static const struct pass_targets scratch = {1};
+    struct gl_target *array = pass_targets(run->ctx, &scratch);
+    gl_target_fit(array, GL_DEPTH_COMPONENT32F, size, size, SAMPLE_MAP_BATCH, 1);
+    *maps = &array->texture;
+    return draw_layers(run, points, count, ~0u, *maps, error);
 }
 
 const struct gl_texture *pass_sample_page(struct technique_run *run,

@@ -1,7 +1,7 @@
 /* Depth maps seen from points of the emitter, as layers of an array: parallel frusta through the
  * same plane, each with the window that fits its casters. */
 #pragma once
-#include "renderer/passes/draw/passes.h"
+#include "renderer/technique.h"
 
 #define SAMPLE_MAP_BATCH 16
 

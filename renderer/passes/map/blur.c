@@ -1,4 +1,5 @@
 #include "renderer/passes/map/blur.h"
+#include "renderer/passes/draw/screen.h"
 #include <math.h>
 
 struct blur_block {

@@ -1,6 +1,6 @@
 /* Separable blur of a texture's level 0, in place, and the rest of its mip chain from it. */
 #pragma once
-#include "renderer/passes/draw/passes.h"
+#include "renderer/technique.h"
 
 #define BLUR_MAX_RADIUS 15
 

@@ -1,5 +1,8 @@
 #include "renderer/passes/map/classify.h"
 #include "protocol/memory.h"
+#include "renderer/passes/draw/passes.h"
+#include "renderer/passes/draw/screen.h"
+#include "renderer/passes/map/min_max.h"
 #include <stdlib.h>
 
 struct classify_block {
@@ -38,79 +41,43 @@ bool pass_fill_umbra(struct technique_run *run, const struct gl_texture *tiles, 
     return true;
 }
 
-/* What a method needs to be true of a decided tile. */
-struct claim {
-    float margin_texels, margin_pixels;
-    bool umbra;      /* looked for too */
-    bool one_window; /* its windows do not shrink by caster, but with the nearest one only */
-    bool seams;      /* it needs what lies beyond the faces of a cube */
-};
-
-static const struct gl_texture *classify(struct technique_run *run,
-    const struct shadow_input *casters, const struct claim *claim, struct pen_error *error)
+bool pass_classify(struct technique_run *run, const struct classify_desc *desc,
+    const struct gl_texture **tiles, struct pen_error *error)
 {
-    struct technique_ctx *ctx = run->ctx;
-    struct gl_texture *tiles = &ctx->tiles;
+    static const struct pass_targets key = {1};
+    *tiles = NULL;
+    if (!run->request->classify.on)
+        return true;
+    const struct shadow_input *casters = pass_caster_min_max(run, desc->map_size, error);
+    if (!casters)
+        return false;
+    struct gl_target *target = pass_targets(run->ctx, &key);
     uint32_t width = (run->width + CLASSIFY_TILE - 1) / CLASSIFY_TILE;
     uint32_t height = (run->height + CLASSIFY_TILE - 1) / CLASSIFY_TILE;
-    if (gl_texture_fit(tiles, GL_RG8, width, height, 0, 1) || !ctx->tiles_framebuffer) {
-        gl.DeleteFramebuffers(1, &ctx->tiles_framebuffer);
-        const struct gl_texture *color = tiles;
-        ctx->tiles_framebuffer = gl_framebuffer_create(&color, 1, NULL);
-    }
+    gl_target_fit(target, GL_RG8, width, height, 0, 1);
     /* Spheres' far sides and textured lights need no zero tiles of their own: 0 is 0 in any colour;
      * but an omnidirectional light lights what lies behind its plane. */
-    struct classify_block block = {.margin = {claim->margin_texels + 1, claim->margin_pixels},
-        .tile = {CLASSIFY_TILE, claim->umbra && !run->face->omni, claim->one_window, claim->seams}};
-    struct pass_texture textures[] = {{UNIT_DEPTH, run->gbuffer->depth.name, GL_SAMPLE_NEAREST},
-        {UNIT_NORMAL, run->gbuffer->normal.name, GL_SAMPLE_NEAREST},
+    struct classify_block block = {.margin = {desc->margin_texels + 1, desc->margin_pixels},
+        .tile = {CLASSIFY_TILE, desc->umbra && !run->face->omni, desc->one_window, desc->seams}};
+    struct pass_texture textures[] = {
+        {UNIT_DEPTH, run->gbuffer->depth.texture.name, GL_SAMPLE_NEAREST},
+        {UNIT_NORMAL, run->gbuffer->normal.texture.name, GL_SAMPLE_NEAREST},
         {UNIT_MIN_MAX, casters->textures[0].name, GL_SAMPLE_NEAREST}};
-    if (!pass_fill(ctx,
+    if (!pass_fill(run->ctx,
             &(struct pass_fill){.name = "classify",
                 .fragment = "classify.frag",
                 .stage = PEN_STAGE_TECHNIQUE,
                 .textures = textures,
                 .texture_count = 3,
-                .framebuffer = ctx->tiles_framebuffer,
+                .framebuffer = target->framebuffer,
                 .width = width,
                 .height = height,
                 .extra = &block,
                 .extra_bytes = sizeof block},
             error) ||
-        !pass_fill_umbra(run, tiles, run->vis_framebuffer, error))
-        return NULL;
-    count_classes(run, tiles);
-    return run->tiles = tiles;
-}
-
-const struct gl_texture *pass_classify(struct technique_run *run,
-    const struct shadow_input *casters, float margin_texels, struct pen_error *error)
-{
-    return classify(
-        run, casters, &(struct claim){.margin_texels = margin_texels, .umbra = true}, error);
-}
-
-const struct gl_texture *pass_classify_screen(struct technique_run *run,
-    const struct shadow_input *casters, float margin_texels, struct pen_error *error)
-{
-    return classify(run, casters, &(struct claim){margin_texels, 0, true, true, true}, error);
-}
-
-const struct gl_texture *pass_classify_lit(struct technique_run *run,
-    const struct shadow_input *casters, float margin_texels, struct pen_error *error)
-{
-    return classify(run, casters, &(struct claim){.margin_texels = margin_texels}, error);
-}
-
-bool pass_lit_tiles(struct technique_run *run, uint32_t map_size, float margin_texels,
-    float margin_pixels, const struct gl_texture **tiles, struct pen_error *error)
-{
-    *tiles = NULL;
-    if (!run->request->classify.on)
-        return true;
-    const struct shadow_input *casters = pass_caster_min_max(run, map_size, error);
-    if (casters)
-        *tiles = classify(
-            run, casters, &(struct claim){margin_texels, margin_pixels, false, true}, error);
-    return *tiles != NULL;
+        !pass_fill_umbra(run, &target->texture, run->vis_framebuffer, error))
+        return false;
+    count_classes(run, &target->texture);
+    *tiles = run->tiles = &target->texture;
+    return true;
 }

@@ -1,4 +1,6 @@
 #include "renderer/passes/map/convolution.h"
+#include "renderer/passes/draw/screen.h"
+#include "renderer/passes/map/depth_map.h"
 #include "renderer/passes/map/sat.h"
 #include <math.h>
 #include <string.h>

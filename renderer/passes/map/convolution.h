@@ -1,7 +1,7 @@
 /* Convolution shadow maps (Annen et al. 2007, 2008): the depth test as a Fourier series whose
  * receiver and caster parts separate, so that the caster part can be filtered before the test. */
 #pragma once
-#include "renderer/passes/draw/passes.h"
+#include "renderer/passes/map/shadow_cache.h"
 
 #define CONVOLUTION_MAX_TERMS 16
 

@@ -1,5 +1,6 @@
+#include "renderer/passes/map/depth_map.h"
 #include "protocol/memory.h"
-#include "renderer/passes/draw/passes.h"
+#include "renderer/passes/map/shadow_cache.h"
 #include <cglm/cglm.h>
 #include <stdlib.h>
 #include <string.h>

@@ -1,4 +1,7 @@
-#include "renderer/passes/draw/passes.h"
+#include "renderer/passes/draw/screen.h"
+#include "renderer/passes/map/depth_map.h"
+#include "renderer/passes/map/min_max.h"
+#include "renderer/passes/map/shadow_cache.h"
 #include <stdio.h>
 
 bool pass_min_max_levels(struct technique_ctx *ctx, const struct gl_texture *depth, uint32_t size,

@@ -1,6 +1,8 @@
 #include "renderer/passes/map/moments.h"
+#include "renderer/passes/draw/screen.h"
 #include "renderer/passes/map/blur.h"
 #include "renderer/passes/map/classify.h"
+#include "renderer/passes/map/depth_map.h"
 #include <string.h>
 
 enum { KEY_KIND, KEY_BLUR, KEY_EXPONENTS };
@@ -54,5 +56,10 @@ bool pass_moment_tiles(struct technique_run *run, const struct moment_map *map,
 {
     /* The kernel, and one and a half texels of the coarser level, which are at most twice as large
      * as the pixel. */
-    return pass_lit_tiles(run, map->size, (float)map->blur + 1.5f, 3, tiles, error);
+    return pass_classify(run,
+        &(struct classify_desc){.map_size = map->size,
+            .margin_texels = (float)map->blur + 1.5f,
+            .margin_pixels = 3,
+            .one_window = true},
+        tiles, error);
 }

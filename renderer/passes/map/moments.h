@@ -1,7 +1,7 @@
 /* Prefiltered moment maps: what a depth map's texels say about depth, averaged, so that a shadow
  * lookup is one filtered fetch. Depth is linear, 0 at near_z and 1 at far_z. */
 #pragma once
-#include "renderer/passes/draw/passes.h"
+#include "renderer/passes/map/shadow_cache.h"
 
 enum moment_kind {
     MOMENTS_VARIANCE,    /* RG32F: z and z^2, with the variance of a plane inside the texel */
@@ -21,6 +21,6 @@ struct moment_map {
 const struct shadow_input *pass_moments(
     struct technique_run *run, const struct moment_map *map, struct pen_error *error);
 
-/* pass_lit_tiles for a lookup in that map (moment_lookup.glsl). */
+/* pass_classify for a lookup in that map (moment_lookup.glsl). */
 bool pass_moment_tiles(struct technique_run *run, const struct moment_map *map,
     const struct gl_texture **tiles, struct pen_error *error);

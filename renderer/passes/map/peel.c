@@ -1,4 +1,6 @@
 #include "renderer/passes/map/peel.h"
+#include "renderer/passes/draw/screen.h"
+#include "renderer/passes/map/depth_map.h"
 
 static void copy_layer(const struct gl_texture *from, const struct gl_texture *to, uint32_t layer)
 {
@@ -13,23 +15,22 @@ static bool draw_layers(struct technique_run *run, uint32_t size, const struct g
     static const float center[2] = {0, 0};
     /* A layer is drawn beside the array: it reads the layer before, and one texture may not be
      * read and written at a time. */
-    struct gl_texture scratch[2] = {0};
+    struct gl_target scratch[2] = {0};
     bool ok = true;
     gl_timer_begin(&run->ctx->timer, PEN_STAGE_SHADOW, "depth layers");
     for (uint32_t layer = 0; ok && layer < maps->layers; layer++) {
-        struct gl_texture *target = &scratch[layer & 1], *before = &scratch[~layer & 1];
-        gl_texture_fit(target, GL_DEPTH_COMPONENT32F, size, size, 0, 1);
-        GLuint framebuffer = gl_framebuffer_create(NULL, 0, target);
-        ok = layer
-                 ? pass_draw_casters_behind(run, framebuffer, size, before->name, error)
-                 : pass_draw_casters(run, framebuffer, size, center, run->face->rect, false, error);
-        gl.DeleteFramebuffers(1, &framebuffer);
+        struct gl_target *target = &scratch[layer & 1], *before = &scratch[~layer & 1];
+        gl_target_fit(target, GL_DEPTH_COMPONENT32F, size, size, 0, 1);
+        ok = layer ? pass_draw_casters_behind(
+                         run, target->framebuffer, size, before->texture.name, error)
+                   : pass_draw_casters(
+                         run, target->framebuffer, size, center, run->face->rect, false, error);
         if (ok)
-            copy_layer(target, maps, layer);
+            copy_layer(&target->texture, maps, layer);
     }
     gl_timer_end(&run->ctx->timer);
-    gl_texture_destroy(&scratch[0]);
-    gl_texture_destroy(&scratch[1]);
+    gl_target_destroy(&scratch[0]);
+    gl_target_destroy(&scratch[1]);
     return ok;
 }
 

@@ -1,6 +1,6 @@
 /* Depth layers of the casters, nearest first (depth peeling, Everitt 2001). */
 #pragma once
-#include "renderer/passes/draw/passes.h"
+#include "renderer/passes/map/shadow_cache.h"
 
 #define PEEL_MAX_LAYERS 4
 

@@ -1,4 +1,6 @@
 #include "renderer/passes/map/sat.h"
+#include "renderer/passes/draw/screen.h"
+#include "renderer/passes/map/depth_map.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -78,7 +80,7 @@ bool sat_scan(struct technique_ctx *ctx, const struct gl_texture *from, const st
     enum sat_path path, struct pen_error *error)
 {
     gl_timer_begin(&ctx->timer, PEN_STAGE_SHADOW, "summed-area table");
-    bool host = path == SAT_HOST || (path == SAT_AUTO && ctx->device.software);
+    bool host = path == SAT_HOST || (path == SAT_AUTO && ctx->software);
     bool ok = host ? scan_on_host(from, to, error) : scan_on_device(ctx, from, to, error);
     gl_timer_end(&ctx->timer);
     return ok;

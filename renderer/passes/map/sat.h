@@ -3,7 +3,7 @@
  * wrap-around cancels as long as the window itself fits, so that a mean keeps its digits wherever
  * in the table the window lies (floating-point tables lose them towards the far corner). */
 #pragma once
-#include "renderer/passes/draw/passes.h"
+#include "renderer/passes/map/shadow_cache.h"
 
 /* How the sums are made; all give the same bits. */
 enum sat_path {

@@ -1,13 +1,14 @@
 /* What both ways of tracing share. */
 #include "renderer/passes/rays/rays.h"
+#include "renderer/passes/draw/screen.h"
 #include <string.h>
 
 void ray_targets_finish(struct ray_targets *t)
 {
-    struct gl_texture *textures[] = {&t->visibility, &t->standard_error, &t->receivers[0],
+    struct gl_target *targets[] = {&t->visibility, &t->standard_error, &t->receivers[0],
         &t->receivers[1], &t->verdicts, &t->spread};
-    for (size_t i = 0; i < sizeof textures / sizeof *textures; i++)
-        gl_texture_destroy(textures[i]);
+    for (size_t i = 0; i < sizeof targets / sizeof *targets; i++)
+        gl_target_destroy(targets[i]);
     GLuint buffers[] = {t->points, t->state, t->list, t->counters, t->job};
     gl.DeleteBuffers(sizeof buffers / sizeof *buffers, buffers);
     gl.DeleteFramebuffers(1, &t->receivers_framebuffer);
@@ -34,15 +35,16 @@ struct pen_trace_light ray_light(const struct technique_run *run)
 
 bool ray_receivers(struct technique_run *run, struct ray_targets *t, struct pen_error *error)
 {
-    bool made = gl_texture_fit(&t->receivers[0], GL_RGBA32F, run->width, run->height, 0, 1);
-    made |= gl_texture_fit(&t->receivers[1], GL_RGBA32F, run->width, run->height, 0, 1);
+    bool made = gl_target_fit(&t->receivers[0], GL_RGBA32F, run->width, run->height, 0, 1);
+    made |= gl_target_fit(&t->receivers[1], GL_RGBA32F, run->width, run->height, 0, 1);
     if (made || !t->receivers_framebuffer) {
         gl.DeleteFramebuffers(1, &t->receivers_framebuffer);
-        const struct gl_texture *colors[] = {&t->receivers[0], &t->receivers[1]};
+        const struct gl_texture *colors[] = {&t->receivers[0].texture, &t->receivers[1].texture};
         t->receivers_framebuffer = gl_framebuffer_create(colors, 2, NULL);
     }
-    struct pass_texture textures[] = {{UNIT_DEPTH, run->gbuffer->depth.name, GL_SAMPLE_NEAREST},
-        {UNIT_NORMAL, run->gbuffer->normal.name, GL_SAMPLE_NEAREST}};
+    struct pass_texture textures[] = {
+        {UNIT_DEPTH, run->gbuffer->depth.texture.name, GL_SAMPLE_NEAREST},
+        {UNIT_NORMAL, run->gbuffer->normal.texture.name, GL_SAMPLE_NEAREST}};
     return pass_fill(run->ctx,
         &(struct pass_fill){.name = "receivers",
             .fragment = "receivers.frag",

@@ -1,7 +1,7 @@
 /* Shadow rays from every receiver of the G-buffer to one light: on the CPU by renderer/trace, or on
  * the device by compute shaders. Both take the same samples under the same rules (trace.h). */
 #pragma once
-#include "renderer/passes/draw/passes.h"
+#include "renderer/technique.h"
 #include "renderer/trace/trace.h"
 
 /* Ray origins are lifted by this times the distance to the eye: what a depth buffer rounds. */
@@ -17,11 +17,11 @@ struct ray_job {
 
 /* What a light's rays leave, and room to work in; kept between frames. Zero to start. */
 struct ray_targets {
-    struct gl_texture visibility;     /* RGBA32F: rgb mean of e V, a mean of V */
-    struct gl_texture standard_error; /* R32F, of a */
-    struct gl_texture receivers[2];   /* RGBA32F: world position, geometric normal; 0: none */
-    GLuint receivers_framebuffer;
-    struct gl_texture verdicts, spread;        /* of the device */
+    struct gl_target visibility;       /* RGBA32F: rgb mean of e V, a mean of V */
+    struct gl_target standard_error;   /* R32F, of a */
+    struct gl_target receivers[2];     /* RGBA32F: world position, geometric normal; 0: none */
+    GLuint receivers_framebuffer;      /* of both */
+    struct gl_target verdicts, spread; /* of the device */
     GLuint points, state, list, counters, job; /* of the device: buffers */
 };
 void ray_targets_finish(struct ray_targets *targets);

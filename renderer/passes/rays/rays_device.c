@@ -134,10 +134,10 @@ static bool prepare(struct work *w, struct pen_error *error)
             &w->points, w->samples, w->job->target_error > 0, round, w->job->seed, error) ||
         !upload_points(w, error))
         return false;
-    gl_texture_fit(&t->visibility, GL_RGBA32F, width, height, 0, 1);
-    gl_texture_fit(&t->standard_error, GL_R32F, width, height, 0, 1);
-    gl_texture_fit(&t->verdicts, GL_R8UI, width, height, 0, 1);
-    gl_texture_fit(&t->spread, GL_R8UI, width, height, 0, 1);
+    gl_target_fit(&t->visibility, GL_RGBA32F, width, height, 0, 1);
+    gl_target_fit(&t->standard_error, GL_R32F, width, height, 0, 1);
+    gl_target_fit(&t->verdicts, GL_R8UI, width, height, 0, 1);
+    gl_target_fit(&t->spread, GL_R8UI, width, height, 0, 1);
     fill_block(w, &block);
     fill_buffer(&t->job, sizeof block, &block);
     fill_buffer(&t->list, (GLsizeiptr)4 * width * height, NULL);
@@ -160,12 +160,12 @@ static void bind(const struct work *w)
     gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, BUFFER_STATE, t->state);
     gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, BUFFER_LIST, t->list);
     gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, BUFFER_COUNTERS, t->counters);
-    bind_image(IMAGE_VISIBILITY, &t->visibility);
-    bind_image(IMAGE_ERROR, &t->standard_error);
-    gl.BindTextureUnit(UNIT_FREE, t->receivers[0].name);
-    gl.BindTextureUnit(UNIT_FREE + 1, t->receivers[1].name);
-    gl.BindTextureUnit(UNIT_VERDICTS, t->verdicts.name);
-    gl.BindTextureUnit(UNIT_SPREAD, t->spread.name);
+    bind_image(IMAGE_VISIBILITY, &t->visibility.texture);
+    bind_image(IMAGE_ERROR, &t->standard_error.texture);
+    gl.BindTextureUnit(UNIT_FREE, t->receivers[0].texture.name);
+    gl.BindTextureUnit(UNIT_FREE + 1, t->receivers[1].texture.name);
+    gl.BindTextureUnit(UNIT_VERDICTS, t->verdicts.texture.name);
+    gl.BindTextureUnit(UNIT_SPREAD, t->spread.texture.name);
     gl.BindTextureUnit(UNIT_EMISSION, w->run->emission->name);
     for (GLuint unit = UNIT_FREE; unit <= UNIT_SPREAD; unit++)
         gl.BindSampler(unit, 0);
@@ -181,7 +181,7 @@ static bool pretest(struct work *w, struct pen_error *error)
     GLuint name = program(w, "ray_pretest.comp", error);
     if (!name)
         return false;
-    bind_image(IMAGE_MARKS, &w->targets->verdicts);
+    bind_image(IMAGE_MARKS, &w->targets->verdicts.texture);
     for (uint32_t y = 0; y < height; y += rows * TILE) {
         uint32_t left = groups(height - y, TILE);
         gl.ProgramUniform1ui(name, LOCATION_FIRST_ROW, y);
@@ -189,7 +189,7 @@ static bool pretest(struct work *w, struct pen_error *error)
     }
     if (!program(w, "ray_spread.comp", error))
         return false;
-    bind_image(IMAGE_MARKS, &w->targets->spread);
+    bind_image(IMAGE_MARKS, &w->targets->spread.texture);
     dispatch(columns, groups(height, TILE));
     return true;
 }
@@ -241,7 +241,7 @@ static bool sample(struct work *w, struct pen_error *error)
     GLuint name = program(w, "ray_samples.comp", error);
     if (!name)
         return false;
-    uint32_t most = w->run->ctx->device.software ? POINTS_ON_SOFTWARE : POINTS_PER_DISPATCH;
+    uint32_t most = w->run->ctx->software ? POINTS_ON_SOFTWARE : POINTS_PER_DISPATCH;
     for (; most >= 2; most /= 2) {
         static const uint32_t zero;
         gl.NamedBufferSubData(

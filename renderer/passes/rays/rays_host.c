@@ -39,12 +39,12 @@ static void read_texture(const struct gl_texture *texture, float *to)
     gl.GetTextureImage(texture->name, 0, GL_RGBA, GL_FLOAT, bytes, to);
 }
 
-static void write_texture(const struct technique_run *run, struct gl_texture *texture,
-    GLenum format, GLenum layout, const float *from)
+static void write_target(const struct technique_run *run, struct gl_target *target, GLenum format,
+    GLenum layout, const float *from)
 {
-    gl_texture_fit(texture, format, run->width, run->height, 0, 1);
-    gl.TextureSubImage2D(
-        texture->name, 0, 0, 0, (GLsizei)run->width, (GLsizei)run->height, layout, GL_FLOAT, from);
+    gl_target_fit(target, format, run->width, run->height, 0, 1);
+    gl.TextureSubImage2D(target->texture.name, 0, 0, 0, (GLsizei)run->width, (GLsizei)run->height,
+        layout, GL_FLOAT, from);
 }
 
 bool pass_rays_host(struct technique_run *run, const struct ray_job *job, struct ray_targets *t,
@@ -75,16 +75,16 @@ bool pass_rays_host(struct technique_run *run, const struct ray_job *job, struct
     struct pen_trace_result result = {
         .visibility = visibility, .standard_error = wants_error ? standard_error : NULL};
     struct pen_trace_stats stats;
-    read_texture(&t->receivers[0], positions);
-    read_texture(&t->receivers[1], normals);
+    read_texture(&t->receivers[0].texture, positions);
+    read_texture(&t->receivers[1].texture, normals);
     gl_timer_begin(&run->ctx->timer, PEN_STAGE_TECHNIQUE, "trace");
     bool ok = pen_trace_visibility(scene, &light, &trace, &result, &stats, error);
     gl_timer_end(&run->ctx->timer);
     if (ok) {
-        write_texture(run, &t->visibility, GL_RGBA32F, GL_RGBA, visibility);
-        gl_texture_fit(&t->standard_error, GL_R32F, run->width, run->height, 0, 1);
+        write_target(run, &t->visibility, GL_RGBA32F, GL_RGBA, visibility);
+        gl_target_fit(&t->standard_error, GL_R32F, run->width, run->height, 0, 1);
         if (wants_error)
-            write_texture(run, &t->standard_error, GL_R32F, GL_RED, standard_error);
+            write_target(run, &t->standard_error, GL_R32F, GL_RED, standard_error);
         run->result->rays += stats.rays;
         run->result->full_work_pixels += (uint32_t)stats.full_receivers;
     }

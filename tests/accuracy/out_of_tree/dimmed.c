@@ -1,6 +1,8 @@
 /* A method that the tree does not know: hard shadows that let a share of the light through. Its
  * three pieces are this file, dimmed.glsl and one line at the end of a copy of registry.def. */
-#include "renderer/passes/draw/passes.h"
+#include "renderer/passes/draw/screen.h"
+#include "renderer/passes/map/depth_map.h"
+#include "renderer/passes/map/shadow_cache.h"
 #include "renderer/techniques/map_params.h"
 
 struct dimmed {

@@ -1,0 +1,16 @@
+/* What it takes to make one image. */
+#pragma once
+#include "renderer/frame/targets.h"
+#include "renderer/scene/emission.h"
+
+struct frame_job {
+    struct technique_ctx *ctx;
+    struct frame_targets *targets;
+    struct scene *scene;
+    struct pen_request *request; /* completed while rendering */
+    const struct technique *technique;
+    void *technique_state;
+    struct emission_cache *emissions;
+    const struct scene *(*find_image)(void *owner, const struct pen_light *light);
+    void *owner;
+};

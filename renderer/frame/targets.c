@@ -1,0 +1,20 @@
+#include "renderer/frame/targets.h"
+#include <string.h>
+
+void frame_targets_finish(struct frame_targets *t)
+{
+    struct gbuffer *g = &t->gbuffer;
+    struct gl_target *targets[] = {&g->depth, &g->normal, &g->albedo, &g->surface, &g->emission,
+        &t->vis, &t->color, &t->beauty, &t->visibility, &t->classes, &t->variance};
+    for (size_t i = 0; i < sizeof targets / sizeof *targets; i++)
+        gl_target_destroy(targets[i]);
+    gl.DeleteFramebuffers(1, &g->framebuffer);
+    memset(t, 0, sizeof *t);
+}
+
+void frame_fit_sum(struct gl_target *target, GLenum format, const struct pen_request *r)
+{
+    static const float zero[4] = {0};
+    gl_target_fit(target, format, r->width, r->height, 0, 1);
+    gl_target_clear(target, zero);
+}

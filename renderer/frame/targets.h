@@ -1,0 +1,16 @@
+/* What the passes of a frame draw into; kept from frame to frame. */
+#pragma once
+#include "renderer/technique.h"
+
+struct frame_targets {
+    struct gbuffer gbuffer;
+    struct gl_target vis;   /* RGBA16F array, a layer per light; aimed at the light at work */
+    struct gl_target color; /* what is read back */
+    /* Sums over lights and jittered frames: */
+    struct gl_target beauty, visibility; /* RGBA32F */
+    struct gl_target classes;            /* RG16F: times proved lit, in umbra */
+    struct gl_target variance;           /* R32F: of the squared standard errors */
+};
+/* Makes a sum fit the request's picture and start at 0. */
+void frame_fit_sum(struct gl_target *target, GLenum format, const struct pen_request *request);
+void frame_targets_finish(struct frame_targets *targets); /* zeroed: nothing happens */

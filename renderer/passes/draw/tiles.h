@@ -1,0 +1,8 @@
+/* Tiles of the image, as a classifier leaves them: RG8, class and number of receivers. */
+#pragma once
+
+#define CLASSIFY_TILE 8 /* px */
+
+/* enum tile_class */
+#define SHARED_ROWS "renderer/shaders/screen/tile_class.def"
+#include "renderer/shared/rows_c.h"

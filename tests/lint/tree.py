@@ -6,12 +6,14 @@ import sys
 ROOT = os.path.realpath(os.path.join(os.path.dirname(__file__), "..", ".."))
 GLSL = (".glsl", ".vert", ".frag", ".comp")
 CODE = GLSL + (".c", ".h", ".cpp", ".def", ".py", ".sh", ".js", ".html", ".css", ".cmake")
-IGNORED_FOLDERS = {".git", "build", "out", "demo-out", "node_modules", "__pycache__"}
+IGNORED_FOLDERS = {".git", "build", "out", "demo-out", "node_modules", "__pycache__",
+                   "penumbra-store"}
 
 
 def files():
-    """Paths relative to the root: tracked ones and new ones that git does not ignore."""
-    listing = subprocess.run(["git", "-C", ROOT, "ls-files", "-co", "--exclude-standard", "-z"],
+    """Paths relative to the root: what git tracks, added files too. What a program leaves in the
+    folder is nobody's source."""
+    listing = subprocess.run(["git", "-C", ROOT, "ls-files", "-z"],
                              capture_output=True, text=True)
     if listing.returncode == 0:
         found = [name for name in listing.stdout.split("\0") if name]

@@ -21,6 +21,6 @@ foreach(program check every_method classifier)
     target_link_libraries(accuracy_out_of_tree_${program} PRIVATE penumbra_extended)
     add_test(NAME accuracy.out_of_tree.${program}
         COMMAND accuracy_out_of_tree_${program} dimmed)
-    set_tests_properties(accuracy.out_of_tree.${program} PROPERTIES LABELS accuracy TIMEOUT 240
+    set_tests_properties(accuracy.out_of_tree.${program} PROPERTIES LABELS accuracy TIMEOUT 1200
         SKIP_RETURN_CODE 77 RESOURCE_LOCK gpu)
 endforeach()

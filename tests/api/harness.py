@@ -1,5 +1,6 @@
 """A daemon of one's own on free ports with a store of its own, and what tests need to talk to it."""
 import atexit
+import contextlib
 import http.client
 import json
 import os
@@ -18,9 +19,11 @@ import zlib
 import schema
 
 BIN = os.environ.get("PENUMBRA_BIN") or os.path.join(os.path.dirname(__file__), "../../build/dev/bin")
-# Sanitizers slow everything down, and so does a busy machine; limits that count time are widened.
-SLOW = float(os.environ.get("PENUMBRA_TEST_SLOWNESS", "1")) * min(
-    8, max(1, os.getloadavg()[0] / (os.cpu_count() or 1)))
+# Sanitizers slow everything down, and so does a busy machine: how long silence is waited for.
+SLOW = float(os.environ.get("PENUMBRA_TEST_SLOWNESS", "1"))
+# What only tells a hang from slowness is widened much more: a pass does not wait for it.
+PATIENCE = 10 * SLOW
+SLOW *= min(8, max(1, os.getloadavg()[0] / (os.cpu_count() or 1)))
 
 
 class Answer:
@@ -67,7 +70,7 @@ class Daemon:
         line = self.process.stdout.readline().decode()
         match = re.search(r"://([\d.]+):(\d+) \(admin: http://([\d.]+):(\d+)\)", line)
         if not match:
-            self.process.wait(20)
+            self.process.wait(20 * PATIENCE)
             raise RuntimeError("the daemon did not start: " + self.log())
         self.port, self.admin_port = int(match[2]), int(match[4])
         if not Daemon.contract and line.startswith("penumbrad") and "http://" in line.split()[4]:
@@ -87,7 +90,7 @@ class Daemon:
 
     def exchange(self, method, path, body=None, headers=None, port=None, timeout=60):
         connection = http.client.HTTPConnection("127.0.0.1", port or self.port,
-                                                timeout=timeout * SLOW)
+                                                timeout=timeout * PATIENCE)
         try:
             connection.request(method, path, body, headers or {})
             response = connection.getresponse()
@@ -112,7 +115,7 @@ class Daemon:
         head = {"Content-Type": "application/json"}
         if fresh:
             head["Cache-Control"] = "no-cache"
-        request = {"deadline_ms": int(30000 * SLOW), **(request or {})}
+        request = {"deadline_ms": int(30000 * PATIENCE), **(request or {})}
         head.update({k.replace("_", "-"): v for k, v in headers.items()})
         return self.call("POST", "/v1/scenes/%s/render" % scene, json.dumps(request), head,
                          timeout=timeout)
@@ -142,13 +145,24 @@ class Daemon:
         return wait(lambda: self.metric("penumbra_workers_up") == 1 and
                     self.children("penumbra-worker"))[0]
 
+    @contextlib.contextmanager
+    def paused(self):
+        """Within it the worker stands still: what is asked for stays under way or in the queue,
+        however fast or slow the machine is."""
+        pid = self.worker()
+        os.kill(pid, signal.SIGSTOP)
+        try:
+            yield
+        finally:
+            os.kill(pid, signal.SIGCONT)
+
     def leftovers(self):
         return os.listdir(os.path.join(self.store, "tmp"))
 
     def stop(self, timeout=30):
         """SIGTERM; returns the exit status."""
         self.process.send_signal(signal.SIGTERM)
-        return self.process.wait(timeout * SLOW)
+        return self.process.wait(timeout * PATIENCE)
 
     def kill(self):
         if self.process and self.process.poll() is None:
@@ -162,7 +176,7 @@ class Daemon:
 
 def wait(condition, seconds=20, step=0.02):
     """Waits until the condition holds and returns its value; fails when it never does."""
-    end = time.monotonic() + seconds * SLOW
+    end = time.monotonic() + seconds * PATIENCE
     while True:
         value = condition()
         if value:

@@ -10,8 +10,8 @@ if(TARGET penumbra_import)
         ${CMAKE_SOURCE_DIR}/tests/api/hostile_files.py --seeds ${seeds})
     add_test(NAME fuzz.import_seeds COMMAND fuzz_import -seed=1 -runs=50000 -max_len=32768
         -dict=${CMAKE_CURRENT_SOURCE_DIR}/fuzz_import.dict -timeout=10 -rss_limit_mb=4096 ${seeds})
-    set_tests_properties(fuzz.import_seeds_files PROPERTIES LABELS fuzz TIMEOUT 120
+    set_tests_properties(fuzz.import_seeds_files PROPERTIES LABELS fuzz TIMEOUT 600
         FIXTURES_SETUP import_seeds)
-    set_tests_properties(fuzz.import_seeds PROPERTIES LABELS fuzz TIMEOUT 600
+    set_tests_properties(fuzz.import_seeds PROPERTIES LABELS fuzz TIMEOUT 1800
         FIXTURES_REQUIRED import_seeds)
 endif()

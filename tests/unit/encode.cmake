@@ -11,7 +11,7 @@ if(PENUMBRA_DAEMON)
     target_link_libraries(encode_sample PRIVATE penumbra_flags penumbra_encode)
     add_test(NAME unit.encode_files
         COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/encode/check_files.py $<TARGET_FILE:encode_sample>)
-    set_tests_properties(unit.encode_files PROPERTIES LABELS unit TIMEOUT 120)
+    set_tests_properties(unit.encode_files PROPERTIES LABELS unit TIMEOUT 600)
     set_tests_properties(unit.encode_formats unit.encode_files PROPERTIES
         ENVIRONMENT "TSAN_OPTIONS=suppressions=${CMAKE_SOURCE_DIR}/tests/tsan.supp")
 endif()

@@ -8,5 +8,5 @@ if(Python3_FOUND)
     target_link_libraries(generate_dump PRIVATE penumbra_generate)
     add_test(NAME unit.generate_glb COMMAND ${Python3_EXECUTABLE}
         ${CMAKE_CURRENT_SOURCE_DIR}/generate_glb.py $<TARGET_FILE:generate_dump>)
-    set_tests_properties(unit.generate_glb PROPERTIES LABELS unit TIMEOUT 120)
+    set_tests_properties(unit.generate_glb PROPERTIES LABELS unit TIMEOUT 600)
 endif()

@@ -22,7 +22,7 @@ if(TARGET penumbra_import)
     find_package(Python3 REQUIRED COMPONENTS Interpreter)
     add_test(NAME unit.import_hostile_files COMMAND ${Python3_EXECUTABLE}
         ${CMAKE_SOURCE_DIR}/tests/api/hostile_files.py ${hostile_folder})
-    set_tests_properties(unit.import_hostile_files PROPERTIES LABELS unit TIMEOUT 120
+    set_tests_properties(unit.import_hostile_files PROPERTIES LABELS unit TIMEOUT 600
         FIXTURES_SETUP hostile_files)
     set_property(TEST unit.import_hostile PROPERTY FIXTURES_REQUIRED hostile_files)
 endif()

@@ -7,7 +7,7 @@ struct run {
     int status;    /* as wait() gives it */
     bool reported; /* exactly one struct pen_error came */
     struct pen_error error;
-    double seconds; /* wall clock */
+    double seconds; /* of processor time */
     long memory_mb; /* largest resident set */
     void *blob;     /* what was written to the output, to be freed; NULL when nothing */
     size_t blob_bytes;

@@ -7,5 +7,5 @@ if(Python3_FOUND)
     target_link_libraries(metrics_dump PRIVATE penumbra_flags penumbra_metrics m)
     add_test(NAME unit.metrics_direct COMMAND ${Python3_EXECUTABLE}
         ${CMAKE_CURRENT_SOURCE_DIR}/metrics.py $<TARGET_FILE:metrics_dump>)
-    set_tests_properties(unit.metrics_direct PROPERTIES LABELS unit TIMEOUT 120)
+    set_tests_properties(unit.metrics_direct PROPERTIES LABELS unit TIMEOUT 600)
 endif()

@@ -1,10 +1,11 @@
 #!/usr/bin/env bash
 # Builds and tests penumbra; installs what is missing first. Ends with ctest's closing lines.
 #   tests/run.sh [--quick] [ctest options]
-# Everything runs under ctest in the dev build; without --quick the unit tests and the API smoke test
-# then run under the address and undefined-behaviour sanitizers, and the server's unit tests under the
-# thread sanitizer, as long as PENUMBRA_TEST_BUDGET_S (1400) seconds are not used up.
-# Exit status: 0 when every stage that ran passed.
+# Everything runs under ctest in the dev build; without --quick all is then compiled with clang too,
+# the unit tests and the API smoke test run under the address and undefined-behaviour sanitizers, and
+# the server's unit tests under the thread sanitizer, as long as PENUMBRA_TEST_BUDGET_S (1400) seconds
+# are not used up. What did not run is listed at the end, with the reason.
+# Exit status: 0 when every stage that ran passed, and none was cut short.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -18,6 +19,7 @@ jobs=$(nproc)
 logs=build/test-logs
 mkdir -p "$logs"
 table=""
+not_run=""
 status=0
 failed_log=""
 
@@ -26,13 +28,34 @@ stage() {
     local name=$1 limit=$2 started=$SECONDS result=ok
     shift 2
     echo "== $name"
-    if ! timeout -k 15 "$limit" "$@" >"$logs/$name.log" 2>&1; then
+    local code=0
+    timeout -k 15 "$limit" "$@" >"$logs/$name.log" 2>&1 || code=$?
+    if [ $code != 0 ]; then
         result=FAILED
+        if [ $code = 124 ] || [ $code = 137 ]; then
+            result="cut short after $limit s"
+            not_run+="  $name: not finished when its $limit s were over"$'\n'
+        fi
         status=1
         [ -n "$failed_log" ] || failed_log=$logs/$name.log
     fi
     table+=$(printf '  %-16s %5d s  %s' "$name" $((SECONDS - started)) "$result")$'\n'
-    [ $result = ok ]
+    [ "$result" = ok ]
+}
+# later NAME STAGE...: whether there is time for one more; else the stages are noted.
+later() {
+    local least=240
+    [ "$(left)" -le $least ] || return 0
+    not_run+="  ${*// /, }: $(left) of $budget s were left, fewer than $least"$'\n'
+    return 1
+}
+# tests_not_run PRESET STAGE [ctest options]: those that were skipped or that the end came before.
+tests_not_run() {
+    local preset=$1 name=$2
+    shift 2
+    [ ! -f "$logs/$name.log" ] ||
+        not_run+=$(python3 -B tests/not_run.py "build/$preset" "$logs/$name.log" \
+            "$logs/$name.xml" "$@" | sed 's/^/  /')$'\n'
 }
 closing() { sed -n '/tests passed, .* tests failed out of/,$p' "$1"; }
 left() { echo $((budget - SECONDS)); }
@@ -43,6 +66,10 @@ finish() {
     fi
     echo "-- times"
     printf '%s' "$table"
+    if [ -n "${not_run//[[:space:]]/}" ]; then
+        echo "-- did not run"
+        grep . <<<"$not_run"
+    fi
     local last=${failed_log:-$logs/ctest.log}
     if [ -f "$last" ] && [ -n "$(closing "$last")" ]; then
         echo "-- $last"
@@ -54,12 +81,19 @@ build() {
     cmake --preset "$1" && cmake --build "build/$1" -j "$jobs"
 }
 run_ctest() {
-    local preset=$1
-    shift
-    ctest --test-dir "build/$preset" --output-on-failure -j "$jobs" --timeout 300 "$@"
+    local preset=$1 name=$2
+    shift 2
+    ctest --test-dir "build/$preset" --output-on-failure --output-junit "$PWD/$logs/$name.xml" \
+        -j "$jobs" --timeout 1200 "$@"
 }
 export -f build run_ctest
-export jobs
+export jobs logs
+if command -v ccache >/dev/null; then
+    export CMAKE_C_COMPILER_LAUNCHER=ccache CMAKE_CXX_COMPILER_LAUNCHER=ccache
+fi
+
+asan=(-L "unit|smoke" --no-tests=error)
+tsan=(-R "^unit\.(server|encode)" --no-tests=error)
 
 # What is uninstrumented below us is not ours to fix; tests/*.supp say what and why.
 export ASAN_OPTIONS=${ASAN_OPTIONS:-detect_leaks=1:abort_on_error=0}
@@ -67,17 +101,25 @@ export LSAN_OPTIONS=${LSAN_OPTIONS:-suppressions=$PWD/tests/lsan.supp:print_supp
 export TSAN_OPTIONS=${TSAN_OPTIONS:-suppressions=$PWD/tests/tsan.supp}
 export UBSAN_OPTIONS=${UBSAN_OPTIONS:-print_stacktrace=1}
 
-rm -f "$logs"/*.log
+rm -f "$logs"/*.log "$logs"/*.xml
 deploy/install-deps.sh
-stage build 900 bash -c 'build dev' || finish
-stage ctest "$(left)" bash -c 'run_ctest dev "$@"' - "$@" || true
-if ! $quick && [ "$(left)" -gt 240 ]; then
-    stage build-asan "$(left)" bash -c 'build asan' &&
-        stage ctest-asan "$(left)" bash -c 'run_ctest asan -L "unit|smoke" --no-tests=error' || true
+stage build 1800 bash -c 'build dev' || finish
+stage ctest "$(left)" bash -c 'run_ctest dev ctest "$@"' - "$@" || true
+tests_not_run dev ctest "$@"
+$quick && finish
+if ! command -v clang++ >/dev/null; then
+    not_run+="  build-clang: clang is not installed"$'\n'
+elif later build-clang; then
+    stage build-clang "$(left)" bash -c 'build clang' || true
 fi
-if ! $quick && [ "$(left)" -gt 240 ]; then
+if later build-asan ctest-asan; then
+    stage build-asan "$(left)" bash -c 'build asan' &&
+        stage ctest-asan "$(left)" bash -c 'run_ctest asan ctest-asan "$@"' - "${asan[@]}" || true
+    tests_not_run asan ctest-asan "${asan[@]}"
+fi
+if later build-tsan ctest-tsan; then
     stage build-tsan "$(left)" bash -c 'build tsan' &&
-        stage ctest-tsan "$(left)" bash -c 'run_ctest tsan -R "^unit\.(server|encode)" --no-tests=error' ||
-        true
+        stage ctest-tsan "$(left)" bash -c 'run_ctest tsan ctest-tsan "$@"' - "${tsan[@]}" || true
+    tests_not_run tsan ctest-tsan "${tsan[@]}"
 fi
 finish

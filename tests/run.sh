@@ -1,10 +1,11 @@
 #!/usr/bin/env bash
 # Builds and tests penumbra; installs what is missing first. Ends with ctest's closing lines.
 #   tests/run.sh [--quick] [ctest options]
-# Everything runs under ctest in the dev build; without --quick all is then compiled with clang too,
-# the unit tests and the API smoke test run under the address and undefined-behaviour sanitizers, and
-# the server's unit tests under the thread sanitizer, as long as PENUMBRA_TEST_BUDGET_S (1400) seconds
-# are not used up. What did not run is listed at the end, with the reason.
+# Everything runs under ctest in the dev build. Without --quick clang-tidy and cppcheck then read the
+# sources (.clang-tidy, tests/lint/cppcheck.txt), clang compiles them too, the unit tests and the API
+# smoke test run under the address and undefined-behaviour sanitizers, and the server's unit tests
+# under the thread sanitizer, as long as PENUMBRA_TEST_BUDGET_S (1400) seconds are not used up. What
+# did not run is listed at the end, with the reason.
 # Exit status: 0 when every stage that ran passed, and none was cut short.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -107,6 +108,13 @@ stage build 1800 bash -c 'build dev' || finish
 stage ctest "$(left)" bash -c 'run_ctest dev ctest "$@"' - "$@" || true
 tests_not_run dev ctest "$@"
 $quick && finish
+for tool in tidy cppcheck; do
+    if ! command -v ${tool/#tidy/clang-tidy} >/dev/null; then
+        not_run+="  $tool: ${tool/#tidy/clang-tidy} is not installed"$'\n'
+    elif later $tool; then
+        stage $tool "$(left)" python3 -B tests/lint/$tool.py build/dev || true
+    fi
+done
 if ! command -v clang++ >/dev/null; then
     not_run+="  build-clang: clang is not installed"$'\n'
 elif later build-clang; then

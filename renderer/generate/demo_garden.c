@@ -59,7 +59,7 @@ static void branch(struct shape *wood, struct shape *leaves, struct dice *dice,
         }
     if (level == TWIG)
         return;
-    int children = level == 0 ? 6 : level == 1 ? 4 : 4;
+    int children = level == 0 ? 6 : 4;
     double spin = dice_uniform(dice, 0, 2 * M_PI);
     for (int c = 0; c < children; c++) {
         bool leader = c == children - 1; /* carries on where the branch ends */

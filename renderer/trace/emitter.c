@@ -21,7 +21,7 @@ bool trace_emitter_average(const struct trace_emitter *e, float mean[3], struct 
             mean[c] = (float)(sum[c] / (double)texels);
         return true;
     }
-    uint32_t *xs = malloc(2 * (size_t)POINTS * sizeof *xs), *ys = xs + POINTS;
+    uint32_t *xs = malloc(2 * (size_t)POINTS * sizeof *xs), *ys = xs ? xs + POINTS : NULL;
     if (!xs || !trace_samples_net(0, POINTS, 0, xs, ys)) {
         free(xs);
         return pen_fail(error, PEN_INTERNAL, "", "Out of memory.");

@@ -27,7 +27,7 @@ bool trace_points_make(struct trace_points *p, uint32_t samples, bool stop, bool
     uint32_t seed, struct pen_error *error)
 {
     uint32_t net = samples, rim = net + TRACE_PRETEST_NET, total = rim + TRACE_PRETEST_RIM;
-    uint32_t *xs = malloc(2 * (size_t)total * sizeof *xs), *ys = xs + total;
+    uint32_t *xs = malloc(2 * (size_t)total * sizeof *xs), *ys = xs ? xs + total : NULL;
     uint32_t block = stop && samples > FIRST_BLOCK ? FIRST_BLOCK : samples;
     uint32_t salt = trace_hash(seed + 1);
     if (!xs)

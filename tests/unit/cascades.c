@@ -178,9 +178,11 @@ static int check_blockers(struct stage *s)
         for (int k = 0; k < 3; k++)
             c[k] = f->parallel ? p[k] + 5 * u * (k < 2 ? at[k] : -1)
                                : p[k] + u * ((k < 2 ? at[k] : 0) - p[k]);
-        float inverse[4][4], back[3];
+        mat4 forward, inverse; /* aligned as cglm wants them */
+        float back[3];
         bool inside = c[2] > f->near_z;
-        glm_mat4_inv((vec4 *)f->world_to_light, inverse);
+        memcpy(forward, f->world_to_light, sizeof forward);
+        glm_mat4_inv(forward, inverse);
         glm_mat4_mulv3(inverse, c, 1, back);
         for (int k = 0; k < 3; k++)
             inside = inside && back[k] > s->light.casters[0][k] && back[k] < s->light.casters[1][k];

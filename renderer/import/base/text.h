@@ -12,7 +12,7 @@ static inline struct imp_text imp_text(const char *text)
 {
     struct imp_text t;
     size_t i = 0;
-    for (; text[i] && i < 100; i++)
+    for (; i < 100 && text[i]; i++)
         t.s[i] = text[i] >= 0x20 && text[i] < 0x7f ? text[i] : '?';
     t.s[i] = 0;
     return t;

@@ -37,7 +37,7 @@ deploy/install-deps.sh --runtime --build --demo
 mkdir -p "$out"
 echo "Building (log: $out/build.log) ..."
 if ! { cmake --preset release && cmake --build build/release -j "$(nproc)" --target \
-    penumbrad penumbra-worker penumbra-import penumbra; } >"$out/build.log" 2>&1; then
+    penumbrad penumbra-worker penumbra-import penumbra manual; } >"$out/build.log" 2>&1; then
     tail -n 40 "$out/build.log" >&2
     exit 1
 fi

@@ -115,5 +115,9 @@ bool process_find_sibling(const char *name, char *path, size_t bytes)
     path[length] = 0;
     char *slash = strrchr(path, '/');
     size_t room = bytes - (size_t)(slash + 1 - path);
-    return snprintf(slash + 1, room, "%s", name) < (int)room;
+    static const char *const folders[] = {"", PENUMBRA_LIBEXEC "/"};
+    for (size_t i = 0; i < sizeof folders / sizeof *folders; i++)
+        if (snprintf(slash + 1, room, "%s%s", folders[i], name) < (int)room && !access(path, X_OK))
+            return true;
+    return false;
 }

@@ -25,5 +25,5 @@ bool process_wait(struct process *process, int timeout_ms, int *status);
 
 /* "crashed (signal 11)", "exited with status 3". */
 const char *process_describe(int status, char *text, size_t bytes);
-/* The full path of a program that lies next to this one. */
+/* The full path of a program that lies next to this one or where installing puts it. */
 bool process_find_sibling(const char *name, char *path, size_t bytes);

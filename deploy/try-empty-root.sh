@@ -3,7 +3,7 @@
 # release, clones this checkout's HEAD into it, and runs deploy/demo.sh and tests/run.sh there.
 #   deploy/try-empty-root.sh bookworm|trixie [--keep DIR] [--log FILE] [tests/run.sh options]
 # Wants root, debootstrap, a network and 6 GB in $TMPDIR (/var/tmp). Packages come from where this
-# machine's apt takes its own. --keep: the root goes to DIR and stays; --log: where all output goes.
+# machine's apt takes its own; PENUMBRA_TEST_BUDGET_S is passed on. --keep: the root goes to DIR and stays; --log: where all output goes.
 # Exit status: 0 when both commands succeeded.
 set -euo pipefail
 here=$(cd "$(dirname "$0")/.." && pwd)
@@ -71,6 +71,7 @@ inside() { # inside TITLE COMMAND...
     env -i PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin HOME=/root LANG=C.UTF-8 \
         ${http_proxy:+http_proxy="$http_proxy"} ${https_proxy:+https_proxy="$https_proxy"} \
         ${no_proxy:+no_proxy="$no_proxy"} \
+        ${PENUMBRA_TEST_BUDGET_S:+PENUMBRA_TEST_BUDGET_S="$PENUMBRA_TEST_BUDGET_S"} \
         chroot "$root" sh -c 'cd /penumbra && exec "$@"' sh "$@" </dev/null 2>&1 |
         tee -a "$log" || result=FAILED
     [ $result = ok ] || status=1

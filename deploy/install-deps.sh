@@ -188,7 +188,8 @@ explain() {
 }
 # Waits for another apt: the first lock is not one that DPkg::Lock::Timeout is about.
 update() {
-    for _ in $(seq 24); do
+    end=$(($(date +%s) + 120))
+    while [ "$(date +%s)" -lt $end ]; do
         $as_root apt-get update -qq >"$log" 2>&1 && return 0
         grep -q -i 'could not get lock\|unable to lock' "$log" || return 1
         sleep 5
@@ -202,7 +203,7 @@ install() {
 }
 
 echo "install-deps: installing$required$optional"
-update || grep -q . "$log" || true
+update || true
 look
 case $required in
 *\?*) explain ;;

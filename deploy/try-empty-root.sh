@@ -3,7 +3,8 @@
 # release, clones this checkout's HEAD into it, and runs deploy/demo.sh and tests/run.sh there.
 #   deploy/try-empty-root.sh bookworm|trixie [--keep DIR] [--log FILE] [tests/run.sh options]
 # Wants root, debootstrap, a network and 6 GB in $TMPDIR (/var/tmp). Packages come from where this
-# machine's apt takes its own; PENUMBRA_TEST_BUDGET_S is passed on. --keep: the root goes to DIR and stays; --log: where all output goes.
+# machine's apt takes its own; PENUMBRA_TEST_BUDGET_S is passed on. --keep: the root goes to DIR and
+# stays; --log: where all output goes.
 # Exit status: 0 when both commands succeeded.
 set -euo pipefail
 here=$(cd "$(dirname "$0")/.." && pwd)
@@ -11,7 +12,7 @@ here=$(cd "$(dirname "$0")/.." && pwd)
 release=${1:-}
 case $release in
 bookworm | trixie) shift ;;
-*) sed -n '2,7s/^# \{0,1\}//p' "$0" >&2 && exit 2 ;;
+*) sed -n '2,8s/^# \{0,1\}//p' "$0" >&2 && exit 2 ;;
 esac
 root="" log=""
 while :; do

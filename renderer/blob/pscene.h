@@ -82,8 +82,6 @@ struct psc_instance {
     uint32_t flags;
 };
 
-enum psc_wrap { PSC_REPEAT, PSC_CLAMP, PSC_MIRROR };
-
 struct psc_texture {
     uint32_t image;
     uint32_t wrap_s, wrap_t; /* enum psc_wrap */
@@ -103,12 +101,9 @@ struct psc_texture_ref {
     float transform[6]; /* row-major 2x3: uv' = T * (uv, 1), from KHR_texture_transform */
 };
 
-enum psc_alpha_mode { PSC_OPAQUE, PSC_MASK, PSC_BLEND };
-enum psc_material_flags {
-    PSC_DOUBLE_SIDED = 1,
-    PSC_UNLIT = 2,
-    PSC_SPECULAR_GLOSSINESS = 4, /* `surface` is rgb specular (sRGB), a glossiness */
-};
+/* enum psc_alpha_mode, enum psc_material_flags, enum psc_wrap */
+#define SHARED_ROWS "renderer/blob/materials.def"
+#include "renderer/shared/rows_c.h"
 
 struct psc_material {
     float base_color[4]; /* linear; specular-glossiness: diffuse */

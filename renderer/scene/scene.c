@@ -11,16 +11,6 @@ struct instance_record {
     uint32_t pad[3];
 };
 
-/* std430 mirror of struct psc_material for the shader. */
-struct material_record {
-    float base_color[4];
-    float emissive[4]; /* w: alpha cutoff */
-    float surface[4];  /* metallic, roughness, occlusion strength, normal scale */
-    float specular[4]; /* specular-glossiness: F0 factor, glossiness */
-    uint32_t flags[4]; /* alpha mode, psc flags, mask of textures present, uv sets (1 bit each) */
-    float transforms[5][8]; /* rows of the 2x3, padded */
-};
-
 static GLuint make_buffer(struct scene *s, const void *data, size_t bytes)
 {
     GLuint name;
@@ -32,14 +22,14 @@ static GLuint make_buffer(struct scene *s, const void *data, size_t bytes)
 
 static const struct psc_texture_ref *slot(const struct psc_material *m, int i)
 {
-    const struct psc_texture_ref *slots[5] = {
+    const struct psc_texture_ref *slots[SCENE_UNITS] = {
         &m->base, &m->surface, &m->normal, &m->occlusion, &m->emission};
     return slots[i];
 }
 
 static bool has_textures(const struct psc_material *m)
 {
-    for (int i = 0; i < 5; i++)
+    for (int i = 0; i < SCENE_UNITS; i++)
         if (slot(m, i)->texture >= 0)
             return true;
     return false;
@@ -60,13 +50,13 @@ static void upload_materials(struct scene *s)
         memcpy(r->specular, m->specular, 12);
         r->specular[3] = m->glossiness;
         r->flags[0] = m->alpha_mode, r->flags[1] = m->flags;
-        for (int k = 0; k < 5; k++) {
+        for (int k = 0; k < SCENE_UNITS; k++) {
             const struct psc_texture_ref *ref = slot(m, k);
             if (ref->texture >= 0)
                 r->flags[2] |= 1u << k;
             r->flags[3] |= (ref->uv_set & 1) << k;
-            memcpy(r->transforms[k], ref->transform, 12);
-            memcpy(r->transforms[k] + 4, ref->transform + 3, 12);
+            memcpy(r->transforms[2 * k], ref->transform, 12);
+            memcpy(r->transforms[2 * k + 1], ref->transform + 3, 12);
         }
         s->has_emission |= m->emissive[0] + m->emissive[1] + m->emissive[2] > 0;
         bool gloss =
@@ -132,27 +122,30 @@ static void bind_stream(GLuint array, GLuint attribute, GLuint binding, GLint si
     gl.VertexArrayAttribBinding(array, attribute, binding);
 }
 
-/* Attribute locations: 0 position, 1 normal, 2 tangent, 3 uv0 + uv1, 4 colour, 8..10 matrix rows,
- * 11 material (as a float: exact up to 2^24). */
+/* The material is a float: exact up to 2^24. */
 static GLuint make_array(struct scene *s, bool full)
 {
     GLuint a;
     gl.CreateVertexArrays(1, &a);
     gl.VertexArrayElementBuffer(a, s->indices);
     gl.VertexArrayVertexBuffer(a, 0, s->positions, 0, 12);
-    bind_stream(a, 0, 0, 3, GL_FLOAT, GL_FALSE, 0);
+    bind_stream(a, ATTRIBUTE_POSITION, 0, 3, GL_FLOAT, GL_FALSE, 0);
     if (full) {
         gl.VertexArrayVertexBuffer(a, 1, s->attributes, 0, sizeof(struct psc_attributes));
-        bind_stream(a, 1, 1, 4, GL_SHORT, GL_TRUE, offsetof(struct psc_attributes, normal));
-        bind_stream(a, 2, 1, 4, GL_SHORT, GL_TRUE, offsetof(struct psc_attributes, tangent));
-        bind_stream(a, 3, 1, 4, GL_FLOAT, GL_FALSE, offsetof(struct psc_attributes, uv));
-        bind_stream(a, 4, 1, 4, GL_UNSIGNED_BYTE, GL_TRUE, offsetof(struct psc_attributes, color));
+        bind_stream(
+            a, ATTRIBUTE_NORMAL, 1, 4, GL_SHORT, GL_TRUE, offsetof(struct psc_attributes, normal));
+        bind_stream(a, ATTRIBUTE_TANGENT, 1, 4, GL_SHORT, GL_TRUE,
+            offsetof(struct psc_attributes, tangent));
+        bind_stream(a, ATTRIBUTE_UV, 1, 4, GL_FLOAT, GL_FALSE, offsetof(struct psc_attributes, uv));
+        bind_stream(a, ATTRIBUTE_COLOR, 1, 4, GL_UNSIGNED_BYTE, GL_TRUE,
+            offsetof(struct psc_attributes, color));
     }
     gl.VertexArrayVertexBuffer(a, 2, s->instances, 0, sizeof(struct instance_record));
     gl.VertexArrayBindingDivisor(a, 2, 1);
     for (GLuint row = 0; row < 3; row++)
-        bind_stream(a, 8 + row, 2, 4, GL_FLOAT, GL_FALSE, 16 * row);
-    bind_stream(a, 11, 2, 1, GL_UNSIGNED_INT, GL_FALSE, offsetof(struct instance_record, material));
+        bind_stream(a, ATTRIBUTE_ROW0 + row, 2, 4, GL_FLOAT, GL_FALSE, 16 * row);
+    bind_stream(a, ATTRIBUTE_MATERIAL, 2, 1, GL_UNSIGNED_INT, GL_FALSE,
+        offsetof(struct instance_record, material));
     return a;
 }
 
@@ -356,7 +349,7 @@ static void find_content(struct scene *s)
 static void bind_material(struct scene *s, uint32_t material)
 {
     const struct psc_material *m = &s->blob.materials[material];
-    for (int i = 0; i < 5; i++) {
+    for (int i = 0; i < SCENE_UNITS; i++) {
         int32_t texture = slot(m, i)->texture;
         if (texture < 0)
             continue;
@@ -388,7 +381,7 @@ uint64_t scene_draw(struct scene *s, const struct cull_view *view, const struct 
     gl.NamedBufferData(s->commands, (GLsizeiptr)(total * sizeof *s->command_room), s->command_room,
         GL_STREAM_DRAW);
     gl.BindBuffer(GL_DRAW_INDIRECT_BUFFER, s->commands);
-    gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, s->materials);
+    gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, STORAGE_MATERIALS, s->materials);
     for (uint32_t g = 0; g < s->group_count; g++) {
         const struct scene_group *group = &s->groups[g];
         if (!runs[g].count)
@@ -409,7 +402,7 @@ uint64_t scene_draw(struct scene *s, const struct cull_view *view, const struct 
     }
     gl.Disable(GL_CULL_FACE);
     gl.FrontFace(GL_CCW);
-    for (GLuint i = 0; i < 5; i++)
+    for (GLuint i = 0; i < SCENE_UNITS; i++)
         gl.BindSampler(i, 0);
 done:
     free(runs);

@@ -5,6 +5,12 @@
 #include "renderer/gl/program.h"
 #include "renderer/gl/texture.h"
 
+/* struct material_record, texture units of the geometry passes, locations of attributes */
+#define SHARED_ROWS "renderer/shaders/geometry/material.def"
+#include "renderer/shared/rows_c.h"
+#define SHARED_ROWS "renderer/shaders/geometry/attributes.def"
+#include "renderer/shared/rows_c.h"
+
 /* Draws that share state. What differs per draw (matrix, material) rides on instance attributes. */
 struct scene_group {
     uint32_t first, count; /* of scene->order */
@@ -62,12 +68,3 @@ struct scene_pass {
 /* Returns the triangles drawn. The caller has bound framebuffer, viewport and depth state. */
 uint64_t scene_draw(
     struct scene *scene, const struct cull_view *view, const struct scene_pass *pass);
-
-/* Texture units of the geometry passes. */
-enum {
-    SCENE_UNIT_BASE,
-    SCENE_UNIT_SURFACE,
-    SCENE_UNIT_NORMAL,
-    SCENE_UNIT_OCCLUSION,
-    SCENE_UNIT_EMISSION
-};

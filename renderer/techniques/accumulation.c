@@ -49,9 +49,9 @@ static bool record(struct technique_run *run, struct pen_error *error)
     struct light_bits *bits = &state->bits[run->face->shape];
     if (params->layers > 1)
         light_bits_fit(bits, 256, (uint32_t)run->face->shape, false);
-    struct pass_texture textures[] = {{UNIT_FREE, layers->textures[0].name, GL_SAMPLE_NEAREST},
+    struct pass_texture textures[] = {{UNIT_CASTERS, layers->textures[0].name, GL_SAMPLE_NEAREST},
         {UNIT_MIN_MAX, layers->textures[1].name, GL_SAMPLE_NEAREST},
-        {UNIT_FREE + 1, bits->below.name, GL_SAMPLE_NEAREST}};
+        {UNIT_LIGHT_BITS, bits->below.name, GL_SAMPLE_NEAREST}};
     return pass_screen(run,
         &(struct pass_screen){.name = "accumulation",
             .body = "accumulation.glsl",

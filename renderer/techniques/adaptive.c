@@ -7,7 +7,8 @@ static const char *const mode_names[] = {"adaptive", "fixed2", "average", NULL};
 static const char *const estimator_names[] = {"csm", "pcf", NULL};
 enum { ESTIMATOR_CSM, ESTIMATOR_PCF };
 
-#define COUNTS_BINDING 1 /* as in adaptive.glsl */
+#define SHARED_ROWS "renderer/techniques/adaptive.def"
+#include "renderer/shared/rows_c.h"
 
 struct adaptive {
     uint32_t map_size;
@@ -65,16 +66,16 @@ static const struct pen_param rows[] = {
 };
 
 struct state {
-    GLuint counts; /* uint[2]: pixels split once, twice */
+    GLuint counts; /* struct adaptive_counts */
 };
 
 static bool create(struct technique_ctx *ctx, void *state, struct pen_error *error)
 {
     (void)ctx, (void)error;
     struct state *s = state;
-    static const uint32_t zero[4];
+    static const struct adaptive_counts zero;
     gl.CreateBuffers(1, &s->counts);
-    gl.NamedBufferData(s->counts, sizeof zero, zero, GL_DYNAMIC_READ);
+    gl.NamedBufferData(s->counts, sizeof zero, &zero, GL_DYNAMIC_READ);
     return true;
 }
 
@@ -89,7 +90,7 @@ static bool record(struct technique_run *run, struct pen_error *error)
     const struct adaptive *params = run->params;
     const struct state *state = run->state;
     struct pass_screen pass = {.name = "adaptive", .body = "adaptive_pcf.glsl"};
-    gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, COUNTS_BINDING, state->counts);
+    gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, STORAGE_COUNTS, state->counts);
     if (params->estimator == ESTIMATOR_CSM) {
         struct convolution_desc desc = CONVOLUTION_DESC(params, true);
         desc.size = params->series_size;
@@ -118,11 +119,11 @@ static void finish(struct technique_ctx *ctx, void *state, struct pen_result *re
 {
     (void)ctx;
     struct state *s = state;
-    static const uint32_t zero[4];
+    static const struct adaptive_counts zero;
     gl.MemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
     gl.GetNamedBufferSubData(
         s->counts, 0, sizeof result->subdivided_pixels, result->subdivided_pixels);
-    gl.NamedBufferSubData(s->counts, 0, sizeof zero, zero);
+    gl.NamedBufferSubData(s->counts, 0, sizeof zero, &zero);
 }
 
 const struct technique technique_adaptive = {

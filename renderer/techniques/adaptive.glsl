@@ -6,9 +6,7 @@
 #include "taps.glsl"
 #include "interleave_colour.glsl"
 
-layout(std430, binding = 1) buffer Counts {
-    uint subdivided[2]; // pixels split once, twice
-};
+#include "adaptive.def"
 
 // Those of a cell estimator, in adaptive_csm.glsl or adaptive_pcf.glsl:
 Receiver adaptive_receiver(Surface s);

@@ -1,9 +1,10 @@
 // What the pixels see of the light samples of a page: a bit per sample for "lit", one for "dark";
 // neither: below the receiver's horizon, or the filter's texels differ. Light pages are numbered as
 // in passes/light/light_tree.h; the first has room for two flags.
-layout(binding = 7) uniform sampler2DArray bits_first;  // pages 0 and 1
-layout(binding = 8) uniform sampler2DArray bits_middle; // 2 to 5
-layout(binding = 9) uniform sampler2DArray bits_last;   // 6 to 21
+#include "adaptive_bits.def"
+layout(binding = UNIT_BITS) uniform sampler2DArray bits_first;  // pages 0 and 1
+layout(binding = UNIT_BITS + 1) uniform sampler2DArray bits_middle; // 2 to 5
+layout(binding = UNIT_BITS + 2) uniform sampler2DArray bits_last;   // 6 to 21
 const uint FLAG = 0x8000u; // in r: something may block the pixel's light
 const uint SAMPLES_OF_FIRST = 0x1ffu;
 

@@ -1,14 +1,9 @@
 // Counts, per quad of the light's tree, the pixels whose samples at its corners disagree: into
 // counters, or by the fragments that remain (QUERY: one quad a pass).
 #include "adaptive_bits.glsl"
-layout(std140, binding = 3) uniform CountBlock {
-    ivec4 count;       // x: quads, y: pages, z: 1: every pixel counts that something may shadow
-    uvec4 corners[64]; // page * 16 + bit
-} quads;
+#include "adaptive_count.def"
 #ifndef QUERY
-layout(std430, binding = 1) buffer Counters {
-    uint disagreeing[];
-} counters;
+#include "adaptive_counters.def"
 #endif
 
 void main()
@@ -34,7 +29,7 @@ void main()
         if (forced || (corners.x & corners.y) != 0u) {
             counted = true;
 #ifndef QUERY
-            atomicAdd(counters.disagreeing[i], 1u);
+            atomicAdd(disagreeing[i], 1u);
 #endif
         }
     }

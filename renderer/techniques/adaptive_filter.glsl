@@ -1,12 +1,8 @@
 // Filtered visibility of one page's samples where samples disagree: rgb = w e V, a = w V.
 #include "sample_maps.glsl"
 #include "adaptive_bits.glsl"
-layout(binding = 10) uniform sampler2DArray maps;
-layout(std140, binding = 3) uniform FilterBlock {
-    SampleMap samples[16];
-    ivec4 count; // x: samples of this page, y: pages
-    uvec4 used[6]; // bits of the samples that the pages have
-} page;
+#include "adaptive_filter.def"
+layout(binding = UNIT_SAMPLE_MAPS) uniform sampler2DArray maps;
 
 vec4 visibility(Surface s)
 {

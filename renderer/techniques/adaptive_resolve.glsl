@@ -1,12 +1,8 @@
 // Sum over the leaves' corners. Where all samples agree it is 1 or 0 without looking.
 #include "sample_maps.glsl"
 #include "adaptive_bits.glsl"
-layout(binding = 10) uniform sampler2D filtered; // of adaptive_filter.glsl
-layout(std140, binding = 3) uniform ResolveBlock {
-    SampleMap samples[289]; // layer.w: page * 16 + bit
-    ivec4 count;            // x: samples, y: pages
-    uvec4 used[6];
-} tree;
+#include "adaptive_resolve.def"
+layout(binding = UNIT_FILTERED) uniform sampler2D filtered; // of adaptive_filter.glsl
 
 vec4 visibility(Surface s)
 {

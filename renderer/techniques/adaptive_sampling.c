@@ -9,8 +9,16 @@
 #include <string.h>
 
 #define MIN_MAX_SIZE 1024 /* texels of the map that is searched for blockers */
-#define MAX_TESTED 64     /* quads of the last level that may split */
-#define BIT_GROUPS 3      /* pages 0 and 1, 2 to 5, 6 to 21: made when a level needs them */
+#define SHARED_ROWS "renderer/techniques/adaptive_bits.def"
+#include "renderer/shared/rows_c.h"
+#define SHARED_ROWS "renderer/techniques/adaptive_test.def"
+#include "renderer/shared/rows_c.h"
+#define SHARED_ROWS "renderer/techniques/adaptive_count.def"
+#include "renderer/shared/rows_c.h"
+#define SHARED_ROWS "renderer/techniques/adaptive_filter.def"
+#include "renderer/shared/rows_c.h"
+#define SHARED_ROWS "renderer/techniques/adaptive_resolve.def"
+#include "renderer/shared/rows_c.h"
 
 static const char *const count_names[] = {"atomic", "occlusion_query", NULL};
 enum { COUNT_ATOMIC, COUNT_OCCLUSION_QUERY };
@@ -41,29 +49,11 @@ static const struct pen_param rows[] = {
     BIAS_ROW(struct adaptive_sampling),
 };
 
-/* As TestBlock, CountBlock, FilterBlock and ResolveBlock of the shaders. */
-struct test_block {
-    struct sample_map samples[16];
-    int32_t count[4];
-    float reach[4];
-};
-struct count_block {
-    int32_t count[4];
-    uint32_t corners[MAX_TESTED][4];
-};
+/* Points that have been tested, by page. */
 struct used_bits {
-    uint32_t words[24];
+    uint32_t words[4 * LIGHT_PAGE_WORDS];
 };
-struct filter_block {
-    struct sample_map samples[16];
-    int32_t count[4];
-    struct used_bits used;
-};
-struct resolve_block {
-    struct sample_map samples[LIGHT_TREE_POINTS];
-    int32_t count[4];
-    struct used_bits used;
-};
+_Static_assert(LIGHT_PAGES <= 4 * LIGHT_PAGE_WORDS, "every page has a word");
 
 struct state {
     struct gl_target bits[BIT_GROUPS];
@@ -77,7 +67,7 @@ struct refinement {
     const struct gl_texture *tiles;
     struct light_tree tree;
     struct sample_point points[LIGHT_TREE_POINTS];
-    struct used_bits used; /* points that have been tested, by page */
+    struct used_bits used;
     const struct gl_texture *maps[LIGHT_PAGES];
     const struct gl_target *sum; /* of the filtered lookups; NULL without a filter */
     uint32_t pages, most_maps;
@@ -123,7 +113,7 @@ static const struct gl_target *page_bits(struct technique_run *run, uint32_t pag
 static void bind_bits(const struct state *state, struct pass_texture textures[BIT_GROUPS])
 {
     for (uint32_t i = 0; i < BIT_GROUPS; i++)
-        textures[i] = (struct pass_texture){UNIT_FREE + i,
+        textures[i] = (struct pass_texture){UNIT_BITS + i,
             state->bits[state->bits[i].texture.name ? i : 0].texture.name, GL_SAMPLE_NEAREST};
 }
 
@@ -159,7 +149,7 @@ static bool test_page(
         return false;
     r->used.words[number] |= fresh;
     struct pass_texture textures[] = {
-        {UNIT_FREE + BIT_GROUPS, r->maps[number]->name, GL_SAMPLE_NEAREST_BORDER},
+        {UNIT_SAMPLE_MAPS, r->maps[number]->name, GL_SAMPLE_NEAREST_BORDER},
         {UNIT_MIN_MAX, r->min_max->textures[0].name, GL_SAMPLE_NEAREST}};
     return pass_screen(run,
         &(struct pass_screen){.name = "light tests",
@@ -227,7 +217,7 @@ static bool count_quads(struct refinement *r, const struct count_block *block,
     if (params->count == COUNT_ATOMIC) {
         static const uint32_t zero;
         gl.ClearNamedBufferData(state->counters, GL_R32UI, GL_RED_INTEGER, GL_UNSIGNED_INT, &zero);
-        gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 1, state->counters);
+        gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, STORAGE_COUNTS, state->counters);
         if (!count_pass(r, block, false, error))
             return false;
         gl.MemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
@@ -314,15 +304,16 @@ static bool filter_pages(struct refinement *r, struct pen_error *error)
     const struct adaptive_sampling *params = run->params;
     r->sum = pass_sum(run);
     for (uint32_t number = 0; number < r->pages; number++) {
-        struct filter_block block = {.used = r->used};
+        struct filter_block block = {.count = {0}};
         struct pass_texture textures[BIT_GROUPS + 1];
         if (!r->used.words[number])
             continue;
+        memcpy(block.used, r->used.words, sizeof block.used);
         block.count[0] = (int32_t)fill_samples(r, number, number + 1, block.samples);
         block.count[1] = (int32_t)r->pages;
         bind_bits(run->state, textures);
         textures[BIT_GROUPS] = (struct pass_texture){
-            UNIT_FREE + BIT_GROUPS, r->maps[number]->name, GL_SAMPLE_NEAREST_BORDER};
+            UNIT_SAMPLE_MAPS, r->maps[number]->name, GL_SAMPLE_NEAREST_BORDER};
         if (!pass_screen(run,
                 &(struct pass_screen){.name = "light filter",
                     .body = "adaptive_filter.glsl",
@@ -344,14 +335,15 @@ static bool resolve(struct refinement *r, struct pen_error *error)
 {
     struct technique_run *run = r->run;
     const struct adaptive_sampling *params = run->params;
-    struct resolve_block block = {.used = r->used};
+    struct resolve_block block = {.count = {0}};
     struct pass_texture textures[BIT_GROUPS + 1];
+    memcpy(block.used, r->used.words, sizeof block.used);
     block.count[0] = (int32_t)fill_samples(r, 0, r->pages, block.samples);
     block.count[1] = (int32_t)r->pages;
     run->result->shadow_maps += (uint32_t)block.count[0];
     bind_bits(run->state, textures);
-    textures[BIT_GROUPS] = (struct pass_texture){
-        UNIT_FREE + BIT_GROUPS, r->sum ? r->sum->texture.name : 0, GL_SAMPLE_NEAREST};
+    textures[BIT_GROUPS] =
+        (struct pass_texture){UNIT_FILTERED, r->sum ? r->sum->texture.name : 0, GL_SAMPLE_NEAREST};
     return pass_screen(run,
         &(struct pass_screen){.name = "light resolve",
             .body = "adaptive_resolve.glsl",

@@ -2,12 +2,8 @@
 #include "sample_maps.glsl"
 #include "min_max.glsl"
 #include "adaptive_bits.glsl"
-layout(binding = 10) uniform sampler2DArray maps;
-layout(std140, binding = 3) uniform TestBlock {
-    SampleMap samples[16];
-    ivec4 count; // x: samples, y: 1 for the first pass of all, which sets the flag
-    vec4 reach;  // x: of the filter, in texels of the map that min_max_pyramid is made of
-} test;
+#include "adaptive_test.def"
+layout(binding = UNIT_SAMPLE_MAPS) uniform sampler2DArray maps;
 
 vec4 visibility(Surface s)
 {

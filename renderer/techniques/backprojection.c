@@ -29,9 +29,9 @@ static bool record(struct technique_run *run, struct pen_error *error)
     const struct gl_texture *tiles;
     if (!patch_tiles(run, params->map_size, params->min_filter, true, &tiles, error))
         return false;
-    struct pass_texture textures[] = {{UNIT_FREE, layers->textures[0].name, GL_SAMPLE_NEAREST},
+    struct pass_texture textures[] = {{UNIT_CASTERS, layers->textures[0].name, GL_SAMPLE_NEAREST},
         {UNIT_MIN_MAX, layers->textures[1].name, GL_SAMPLE_NEAREST},
-        {UNIT_FREE + 2, sums ? sums->textures[0].name : 0, GL_SAMPLE_LINEAR}};
+        {UNIT_EMISSION_SUMS, sums ? sums->textures[0].name : 0, GL_SAMPLE_LINEAR}};
     return pass_screen(run,
         &(struct pass_screen){.name = "backprojection",
             .body = "backprojection.glsl",

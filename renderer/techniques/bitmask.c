@@ -41,7 +41,7 @@ static bool sample_emission(
 {
     struct bitmask_state *state = run->state;
     gl_target_fit(&state->emission, GL_RGBA32F, bits->at.width, bits->at.height, 0, 1);
-    struct pass_texture textures[] = {{UNIT_FREE, bits->at.name, GL_SAMPLE_NEAREST},
+    struct pass_texture textures[] = {{UNIT_SOURCE, bits->at.name, GL_SAMPLE_NEAREST},
         {UNIT_EMISSION, run->emission->name, GL_SAMPLE_TRILINEAR}};
     return pass_fill(run->ctx,
         &(struct pass_fill){.name = "emission of the points",
@@ -71,10 +71,10 @@ static bool record(struct technique_run *run, struct pen_error *error)
     light_bits_fit(bits, params->samples ? 256 : 64, (uint32_t)run->face->shape, jittered);
     if (textured && !sample_emission(run, bits, error))
         return false;
-    struct pass_texture textures[] = {{UNIT_FREE, layers->textures[0].name, GL_SAMPLE_NEAREST},
+    struct pass_texture textures[] = {{UNIT_CASTERS, layers->textures[0].name, GL_SAMPLE_NEAREST},
         {UNIT_MIN_MAX, layers->textures[1].name, GL_SAMPLE_NEAREST},
-        {UNIT_FREE + 1, bits->below.name, GL_SAMPLE_NEAREST},
-        {UNIT_FREE + 2, state->emission.texture.name, GL_SAMPLE_NEAREST}};
+        {UNIT_LIGHT_BITS, bits->below.name, GL_SAMPLE_NEAREST},
+        {UNIT_BIT_EMISSION, state->emission.texture.name, GL_SAMPLE_NEAREST}};
     struct pass_screen pass = {.name = "bitmask",
         .body = "bitmask.glsl",
         .defines = textured ? "#define TEXTURED\n" : NULL,

@@ -4,7 +4,7 @@
 #define LIGHT_BITS (P(samples) == SAMPLES_64 ? 64 : 256)
 #include "light_bits.glsl"
 #ifdef TEXTURED
-layout(binding = 9) uniform sampler2D bit_emission; // (point, pattern)
+layout(binding = UNIT_BIT_EMISSION) uniform sampler2D bit_emission; // (point, pattern)
 #endif
 
 void add_patch(vec2 low, vec2 high, float share)

@@ -1,6 +1,6 @@
 // Emission at every point of every pattern of light_bits, averaged over about a point's share.
 #include "light.glsl"
-layout(binding = 7) uniform sampler2D points;
+layout(binding = UNIT_SOURCE) uniform sampler2D points;
 layout(location = 0) out vec4 emission;
 
 void main()

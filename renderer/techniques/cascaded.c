@@ -65,12 +65,10 @@ static const struct pen_param rows[] = {
     BIAS_ROW(struct cascaded),
 };
 
-/* One cascade of one face. As CascadeBlock in cascaded.glsl. */
-struct cascade_block {
-    struct sample_map samples[CASCADE_MAX_SIDE * CASCADE_MAX_SIDE];
-    int32_t count[4];
-    float fade[4];
-};
+#define SHARED_ROWS "renderer/techniques/cascaded.def"
+#include "renderer/shared/rows_c.h"
+#define SHARED_ROWS "renderer/techniques/cascaded_tiles.def"
+#include "renderer/shared/rows_c.h"
 
 struct cascade {
     uint32_t number, side, map_size, kernel;
@@ -106,7 +104,7 @@ static bool read_tiles(
         free(state->depth);
         state->depth = pen_alloc(bytes, 1);
     }
-    int32_t block[4] = {TILE};
+    struct depth_tiles_block block = {.tile = {TILE}};
     struct pass_texture depth = {UNIT_DEPTH, run->gbuffer->depth.texture.name, GL_SAMPLE_NEAREST};
     if (!pass_fill(run->ctx,
             &(struct pass_fill){.name = "depth tiles",
@@ -117,7 +115,7 @@ static bool read_tiles(
                 .framebuffer = state->tiles.framebuffer,
                 .width = tiles->width,
                 .height = tiles->height,
-                .extra = block,
+                .extra = &block,
                 .extra_bytes = sizeof block},
             error))
         return false;
@@ -200,7 +198,8 @@ static bool add_cascade(struct technique_run *run, struct cascade *c,
     char defines[64];
     snprintf(defines, sizeof defines, "%s%s", sample_map_kernel(c->kernel),
         c->kernel * c->side * c->side >= 48 ? "#define MANY_LEVELS\n" : "");
-    struct pass_texture textures[] = {{UNIT_FREE, maps->textures[0].name, GL_SAMPLE_NEAREST_BORDER},
+    struct pass_texture textures[] = {
+        {UNIT_SAMPLE_MAPS, maps->textures[0].name, GL_SAMPLE_NEAREST_BORDER},
         {UNIT_MIN_MAX, min_max->textures[0].name, GL_SAMPLE_NEAREST}};
     return pass_screen(run,
         &(struct pass_screen){.name = names[c->number],
@@ -278,7 +277,7 @@ static bool record(struct technique_run *run, struct pen_error *error)
         if (!add_cascade(run, &c, tiles, min_max, sum, error))
             return false;
     }
-    struct pass_texture summed = {UNIT_FREE, sum->texture.name, GL_SAMPLE_NEAREST};
+    struct pass_texture summed = {UNIT_SOURCE, sum->texture.name, GL_SAMPLE_NEAREST};
     return pass_screen(run,
         &(struct pass_screen){.name = "cascaded resolve",
             .body = "cascaded_resolve.glsl",

@@ -2,12 +2,8 @@
 // where cascades blend. rgb = mean emission - T, a = 1 - V: what no cascade touches stays lit.
 #include "sample_maps.glsl"
 #include "min_max.glsl"
-layout(binding = 7) uniform sampler2DArray maps;
-layout(std140, binding = 3) uniform CascadeBlock {
-    SampleMap samples[64];
-    ivec4 count; // x: samples, y: side of the kernel, z: samples along a side of the emitter
-    vec4 fade;   // in from x to y, out from z to w, m of view distance
-} cascade;
+#include "cascaded.def"
+layout(binding = UNIT_SAMPLE_MAPS) uniform sampler2DArray maps;
 
 float ramp(float d, float from, float to)
 {

@@ -1,4 +1,4 @@
-layout(binding = 7) uniform sampler2D darkness;
+layout(binding = UNIT_SOURCE) uniform sampler2D darkness;
 
 vec4 visibility(Surface s)
 {

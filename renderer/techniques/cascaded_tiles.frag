@@ -1,8 +1,6 @@
 // One fragment per tile: reversed depth of its farthest and nearest receiver; 0: none.
-layout(binding = 0) uniform sampler2D g_depth;
-layout(std140, binding = 3) uniform DepthTiles {
-    ivec4 tile; // x: px
-} tiles;
+#include "cascaded_tiles.def"
+layout(binding = UNIT_DEPTH) uniform sampler2D g_depth;
 layout(location = 0) out vec2 range;
 
 void main()

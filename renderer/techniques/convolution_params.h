@@ -50,8 +50,8 @@ static inline bool convolution_screen(struct technique_run *run,
     enum gl_sampler_kind sampler = tables ? GL_SAMPLE_NEAREST : GL_SAMPLE_TRILINEAR;
     struct convolution_block block = convolution_constants(desc);
     convolution_fit(&block, desc, run->face);
-    struct pass_texture textures[] = {{UNIT_FREE, series->textures[0].name, sampler},
-        {UNIT_FREE + 1, series->textures[desc->weighted].name, sampler},
+    struct pass_texture textures[] = {{UNIT_BASIS, series->textures[0].name, sampler},
+        {UNIT_BASIS_WEIGHTED, series->textures[desc->weighted].name, sampler},
         {UNIT_MIN_MAX, min_max->textures[0].name, GL_SAMPLE_NEAREST}};
     pass.textures = textures;
     pass.texture_count = 3;

@@ -7,6 +7,15 @@
 #include <math.h>
 #include <string.h>
 
+#define SHARED_ROWS "renderer/techniques/erosion.def"
+#include "renderer/shared/rows_c.h"
+#define SHARED_ROWS "renderer/techniques/erosion_flood.def"
+#include "renderer/shared/rows_c.h"
+#define SHARED_ROWS "renderer/techniques/erosion_window.def"
+#include "renderer/shared/rows_c.h"
+#define SHARED_ROWS "renderer/shaders/map/level.def"
+#include "renderer/shared/rows_c.h"
+
 static const char *const variant_names[] = {"pcf", "direct", NULL};
 enum { VARIANT_PCF, VARIANT_DIRECT };
 
@@ -77,7 +86,7 @@ static GLuint texture(const struct technique_run *run, int which)
 struct inputs {
     const struct shadow_input *map, *min_max;
     const struct gl_texture *tiles; /* or NULL */
-    float unit[4];                  /* UnitBlock of erosion_window.glsl */
+    struct unit_block unit;
 };
 
 /* The depth of what the light sees, m, the same for all its faces. */
@@ -107,7 +116,7 @@ static bool write_target(struct technique_run *run, int which, const char *body,
             .texture_count = 1,
             .tiles = inputs->tiles,
             .framebuffer = state->targets[which].framebuffer,
-            .extra = inputs->unit,
+            .extra = &inputs->unit,
             .extra_bytes = sizeof inputs->unit},
         error);
 }
@@ -121,7 +130,7 @@ static bool write_hard(
     const struct erosion *params = run->params;
     const struct gl_target *hard = target(run, HARD, GL_RGBA16F, 1);
     memset(inputs, 0, sizeof *inputs);
-    inputs->unit[0] = depth_of(run->light);
+    inputs->unit.length[0] = depth_of(run->light);
     inputs->map = pass_caster_map(run, params->map_size, error);
     inputs->min_max = inputs->map ? pass_caster_min_max(run, params->map_size, error) : NULL;
     if (!inputs->min_max)
@@ -139,7 +148,8 @@ struct fill {
     uint32_t target_level;
     struct pass_texture textures[8];
     uint32_t texture_count;
-    int32_t block[4];
+    const void *block;
+    uint32_t block_bytes;
 };
 
 static bool fill(struct technique_run *run, const struct fill *f, struct pen_error *error)
@@ -163,7 +173,7 @@ static bool fill(struct technique_run *run, const struct fill *f, struct pen_err
             .width = width,
             .height = height,
             .extra = f->block,
-            .extra_bytes = sizeof f->block,
+            .extra_bytes = f->block_bytes,
             .info = &run->technique->info,
             .params = run->params},
         error);
@@ -173,14 +183,17 @@ static bool build_edge_pyramid(
     struct technique_run *run, const struct gl_target *pyramid, struct pen_error *error)
 {
     for (uint32_t level = 0; level < pyramid->texture.levels; level++) {
+        struct level_block from = {.level = {(int32_t)level - 1}};
         struct fill f = {.name = level ? "edge pyramid" : "edges",
             .fragment = level ? "erosion_pyramid.frag" : "erosion_edges.frag",
             .defines = "#define PYRAMID\n",
             .target = pyramid,
             .target_level = level,
-            .textures = {{UNIT_FREE, texture(run, level ? EDGES : HARD), GL_SAMPLE_NEAREST}},
+            .textures = {{level ? UNIT_SOURCE : UNIT_HARD, texture(run, level ? EDGES : HARD),
+                GL_SAMPLE_NEAREST}},
             .texture_count = 1,
-            .block = {(int32_t)level - 1}};
+            .block = &from,
+            .block_bytes = sizeof from};
         if (!fill(run, &f, error))
             return false;
     }
@@ -196,15 +209,15 @@ static bool record_pcf(struct technique_run *run, struct pen_error *error)
      * that lie beyond its border. */
     if (!write_hard(run, &inputs, true, error) || !build_edge_pyramid(run, pyramid, error))
         return false;
-    struct pass_texture textures[] = {{UNIT_FREE, texture(run, HARD), GL_SAMPLE_NEAREST},
-        {UNIT_FREE + 1, texture(run, EDGES), GL_SAMPLE_TRILINEAR}};
+    struct pass_texture textures[] = {{UNIT_HARD, texture(run, HARD), GL_SAMPLE_NEAREST},
+        {UNIT_EDGES, texture(run, EDGES), GL_SAMPLE_TRILINEAR}};
     struct pass_screen pass = {.name = "erosion",
         .body = "erosion.glsl",
         .shadow = &inputs.map->textures[0],
         .textures = textures,
         .texture_count = 2,
         .tiles = inputs.tiles,
-        .extra = inputs.unit,
+        .extra = &inputs.unit,
         .extra_bytes = sizeof inputs.unit};
     /* The average knows nothing of other faces. */
     bool smooth = params->smooth.on && !run->face->cube;
@@ -216,17 +229,17 @@ static bool fit_lines(struct technique_run *run, struct pen_error *error)
     struct fill find = {.name = "edges",
         .fragment = "erosion_edges.frag",
         .target = target(run, EDGES, GL_RG16F, 1),
-        .textures = {{UNIT_FREE, texture(run, HARD), GL_SAMPLE_NEAREST}},
+        .textures = {{UNIT_HARD, texture(run, HARD), GL_SAMPLE_NEAREST}},
         .texture_count = 1};
     struct fill fit = {.name = "line fit",
         .fragment = "erosion_lines.frag",
         .target = target(run, ROUGH, GL_RGBA16F, 1),
-        .textures = {{UNIT_FREE, texture(run, EDGES), GL_SAMPLE_NEAREST}},
+        .textures = {{UNIT_EDGES, texture(run, EDGES), GL_SAMPLE_NEAREST}},
         .texture_count = 1};
     struct fill smooth = {.name = "line fit",
         .fragment = "erosion_smooth.frag",
         .target = target(run, LINES, GL_RGBA16F, 1),
-        .textures = {{UNIT_FREE, texture(run, ROUGH), GL_SAMPLE_NEAREST}},
+        .textures = {{UNIT_LINES, texture(run, ROUGH), GL_SAMPLE_NEAREST}},
         .texture_count = 1};
     return fill(run, &find, error) && fill(run, &fit, error) && fill(run, &smooth, error);
 }
@@ -236,25 +249,27 @@ static bool flood(struct technique_run *run, GLuint *seeds, struct pen_error *er
     const struct erosion *params = run->params;
     const struct gl_target *pair[2] = {
         target(run, SEEDS, GL_RG16F, 1), target(run, SEEDS_NEXT, GL_RG16F, 1)};
-    static const float none[4] = {1e4f, 1e4f}; /* FAR in erosion_line.glsl */
+    static const float none[4] = {EROSION_FAR, EROSION_FAR};
     gl_target_clear(pair[0], none);
     gl_target_clear(pair[1], none);
     int32_t step = 1;
     while (2 * step < (int32_t)params->max_radius)
         step *= 2;
     for (uint32_t i = 0; step; i++, step /= 2) {
+        struct flood_block block = {.step = {step}};
         struct fill f = {.name = "jump flood",
             .fragment = "erosion_flood.frag",
             .defines = i ? NULL : "#define FIRST\n",
             .target = pair[i & 1],
             .textures = {{UNIT_DEPTH, run->gbuffer->depth.texture.name, GL_SAMPLE_NEAREST},
                 {UNIT_NORMAL, run->gbuffer->normal.texture.name, GL_SAMPLE_NEAREST},
-                {UNIT_FREE, texture(run, HARD), GL_SAMPLE_NEAREST},
-                {UNIT_FREE + 1, texture(run, AXES), GL_SAMPLE_NEAREST},
-                {UNIT_FREE + 2, texture(run, LINES), GL_SAMPLE_NEAREST},
-                {UNIT_FREE + 3, pair[~i & 1]->texture.name, GL_SAMPLE_NEAREST}},
+                {UNIT_HARD, texture(run, HARD), GL_SAMPLE_NEAREST},
+                {UNIT_AXES, texture(run, AXES), GL_SAMPLE_NEAREST},
+                {UNIT_LINES, texture(run, LINES), GL_SAMPLE_NEAREST},
+                {UNIT_SEEDS, pair[~i & 1]->texture.name, GL_SAMPLE_NEAREST}},
             .texture_count = i ? 6 : 5,
-            .block = {step}};
+            .block = &block,
+            .block_bytes = sizeof block};
         if (!fill(run, &f, error))
             return false;
         *seeds = pair[i & 1]->texture.name;
@@ -279,10 +294,10 @@ static bool record_direct(struct technique_run *run, struct pen_error *error)
         .fragment = "erosion_direct.frag",
         .textures = {{UNIT_DEPTH, run->gbuffer->depth.texture.name, GL_SAMPLE_NEAREST},
             {UNIT_NORMAL, run->gbuffer->normal.texture.name, GL_SAMPLE_NEAREST},
-            {UNIT_FREE, texture(run, HARD), GL_SAMPLE_NEAREST},
-            {UNIT_FREE + 1, texture(run, AXES), GL_SAMPLE_NEAREST},
-            {UNIT_FREE + 2, texture(run, LINES), GL_SAMPLE_NEAREST},
-            {UNIT_FREE + 3, seeds, GL_SAMPLE_NEAREST}},
+            {UNIT_HARD, texture(run, HARD), GL_SAMPLE_NEAREST},
+            {UNIT_AXES, texture(run, AXES), GL_SAMPLE_NEAREST},
+            {UNIT_LINES, texture(run, LINES), GL_SAMPLE_NEAREST},
+            {UNIT_SEEDS, seeds, GL_SAMPLE_NEAREST}},
         .texture_count = 6};
     return fill(run, &f, error);
 }

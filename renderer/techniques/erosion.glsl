@@ -3,8 +3,9 @@
 #include "light_pcf.glsl"
 #include "dither.glsl"
 #include "erosion_window.glsl"
-layout(binding = 7) uniform sampler2D hard_map;
-layout(binding = 8) uniform sampler2D edge_pyramid; // trilinear
+#include "erosion.def"
+layout(binding = UNIT_HARD) uniform sampler2D hard_map;
+layout(binding = UNIT_EDGES) uniform sampler2D edge_pyramid; // trilinear
 
 // The largest W of the edges within `radius` pixels, from 2 x 2 texels; 0: none.
 float edge_within(ivec2 pixel, float radius)

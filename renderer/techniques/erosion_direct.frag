@@ -2,7 +2,7 @@
 // s_outer = (w - d) / 2w with w half the penumbra, as visibility and over both sides at once.
 #include "erosion_line.glsl"
 #include "pixel_horizon.glsl"
-layout(binding = 10) uniform sampler2D seeds;
+layout(binding = UNIT_SEEDS) uniform sampler2D seeds;
 layout(location = 0) out vec4 vis;
 
 void main()

@@ -4,7 +4,8 @@
 //   otherwise: (which of the neighbours right, left, below, above are lit, as bits; W), and only
 //              edges that are silhouettes in the shadow map
 #include "view.glsl"
-layout(binding = 7) uniform sampler2D hard_map;
+#include "erosion.def"
+layout(binding = UNIT_HARD) uniform sampler2D hard_map;
 #ifdef PYRAMID
 layout(location = 0) out vec4 edge;
 #else

@@ -1,10 +1,8 @@
 // One step of jump flooding (Rong and Tan 2006): each pixel keeps the offset of the edge that is
 // nearest in half penumbra widths, among those on its own plane. FIRST: every edge is its own seed.
 #include "erosion_line.glsl"
-layout(binding = 10) uniform sampler2D seeds;
-layout(std140, binding = 3) uniform StepBlock {
-    ivec4 step;
-} flood;
+#include "erosion_flood.def"
+layout(binding = UNIT_SEEDS) uniform sampler2D seeds;
 layout(location = 0) out vec2 seed;
 
 void main()

@@ -2,11 +2,12 @@
 #include "view.glsl"
 #include "light.glsl"
 #include "surface_plane.glsl"
-layout(binding = 7) uniform sampler2D hard_map;
-layout(binding = 8) uniform sampler2D axes_map;
-layout(binding = 9) uniform sampler2D lines;
+#include "erosion.def"
+layout(binding = UNIT_HARD) uniform sampler2D hard_map;
+layout(binding = UNIT_AXES) uniform sampler2D axes_map;
+layout(binding = UNIT_LINES) uniform sampler2D lines;
 
-const float FAR = 1e4; // no edge
+const float FAR = EROSION_FAR; // no edge
 
 // Positive on the lit side. `to`: offset of the edge pixel; `line`: from erosion_lines.frag. Past the
 // end of an edge (a corner) the distance grows along it too.

@@ -2,7 +2,8 @@
 // midpoints between shadowed and lit neighbours): (unit normal towards the light, distance of the
 // line from the pixel's centre along it, W). Needs P(fit_radius).
 #include "view.glsl"
-layout(binding = 7) uniform sampler2D edges;
+#include "erosion.def"
+layout(binding = UNIT_EDGES) uniform sampler2D edges;
 layout(location = 0) out vec4 line;
 
 // Sums of weight, position and outer products of the boundary points of the edge pixel at `offset`.

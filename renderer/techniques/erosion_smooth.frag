@@ -2,7 +2,8 @@
 // steps aside by a pixel, a short fit takes the step for a slope, and under a rectangular light the
 // width of the penumbra depends on that. Needs P(fit_radius).
 #include "view.glsl"
-layout(binding = 7) uniform sampler2D lines;
+#include "erosion.def"
+layout(binding = UNIT_LINES) uniform sampler2D lines;
 layout(location = 0) out vec4 line;
 
 void main()

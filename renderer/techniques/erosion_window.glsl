@@ -1,8 +1,6 @@
 // F2 and F3 with the distance of the map plane moved from W to the extent: it differs from face to
 // face of a cube. W is kept near 1 by a length of the light, since half floats hold it.
-layout(std140, binding = 3) uniform UnitBlock {
-    vec4 length; // x: m
-} unit;
+#include "erosion_window.def"
 
 #define window_unit (light_parallel ? unit.length.x : light.near_z / unit.length.x)
 #define window_extent (light.extent * window_unit)

@@ -16,7 +16,7 @@ static inline bool moment_screen(struct technique_run *run, const struct moment_
     const struct gl_texture *tiles;
     if (!map || !pass_moment_tiles(run, desc, &tiles, error))
         return false;
-    struct pass_texture texture = {UNIT_FREE, map->textures[0].name, GL_SAMPLE_TRILINEAR};
+    struct pass_texture texture = {UNIT_SOURCE, map->textures[0].name, GL_SAMPLE_TRILINEAR};
     return pass_screen(run,
         &(struct pass_screen){
             .name = name, .body = body, .textures = &texture, .texture_count = 1, .tiles = tiles},

@@ -11,7 +11,7 @@ vec4 window_moments(vec2 low, vec2 high, bool exact)
     if (exact) {
         packed_mean = sat_mean(low, high);
     } else {
-        ivec2 a = ivec2(low), b = min(ivec2(ceil(high)), int(sat_info.y));
+        ivec2 a = ivec2(low), b = min(ivec2(ceil(high)), int(sat_info.side));
         packed_mean = sat_mean_whole(a, max(b, a + 1));
     }
     return moments_bias(moments_unpack(packed_mean), P(moment_bias));
@@ -32,7 +32,7 @@ vec2 part_blockers(vec2 low, vec2 high, bool exact, vec2 q, ReceiverPlane plane,
 vec4 visibility(Surface s)
 {
     vec2 q = light_project(s.p), texel = sat_texel(), least = P(min_filter) * texel;
-    vec2 widest = 0.5 * sat_info.zw * texel;
+    vec2 widest = 0.5 * sat_info.window * texel;
     ReceiverPlane plane = receiver_plane(s.p, s.n);
     float bias = P(bias) * s.p.z / (light.far_z - light.near_z);
     // The square as large as the disk.
@@ -45,8 +45,8 @@ vec4 visibility(Surface s)
     int steps = lit || blocked ? 0 : 2;
     for (int i = 0; i < steps; i++) {
         extent = min(max(extent * shape, least), widest);
-        vec2 low = clamp((q - extent - light.rect.xy) / texel, 0.0, sat_info.y);
-        vec2 high = clamp((q + extent - light.rect.xy) / texel, 0.0, sat_info.y);
+        vec2 low = clamp((q - extent - light.rect.xy) / texel, 0.0, sat_info.side);
+        vec2 high = clamp((q + extent - light.rect.xy) / texel, 0.0, sat_info.side);
         vec2 size = high - low;
         // What lies outside the map is lit.
         float inside = size.x * size.y * texel.x * texel.y / (4.0 * extent.x * extent.y);

@@ -23,11 +23,8 @@ static const struct pen_param rows[] = {
     BIAS_ROW(struct multisample),
 };
 
-struct lookup_block {
-    struct sample_map samples[SAMPLE_MAP_BATCH];
-    int32_t count[4];
-    float weight[4]; /* x: 1 / samples */
-};
+#define SHARED_ROWS "renderer/techniques/multisample.def"
+#include "renderer/shared/rows_c.h"
 
 static bool add_batch(struct technique_run *run, const struct sample_point *points, uint32_t first,
     uint32_t count, bool keep, const struct gl_target *sum, struct pen_error *error)
@@ -39,7 +36,7 @@ static bool add_batch(struct technique_run *run, const struct sample_point *poin
     if (!pass_sample_maps(
             run, points + first, count, params->map_size, first, keep, block.samples, &maps, error))
         return false;
-    struct pass_texture texture = {UNIT_FREE, maps->name, GL_SAMPLE_NEAREST_BORDER};
+    struct pass_texture texture = {UNIT_SAMPLE_MAPS, maps->name, GL_SAMPLE_NEAREST_BORDER};
     return pass_screen(run,
         &(struct pass_screen){.name = "multisample lookup",
             .body = "multisample.glsl",
@@ -66,7 +63,7 @@ static bool record(struct technique_run *run, struct pen_error *error)
         if (!add_batch(run, points, first, n, keep, sum, error))
             return false;
     }
-    struct pass_texture summed = {UNIT_FREE, sum->texture.name, GL_SAMPLE_NEAREST};
+    struct pass_texture summed = {UNIT_SOURCE, sum->texture.name, GL_SAMPLE_NEAREST};
     return pass_screen(run,
         &(struct pass_screen){.name = "multisample resolve",
             .body = "multisample_resolve.glsl",

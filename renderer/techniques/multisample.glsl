@@ -1,11 +1,7 @@
 // One batch of light samples, added to the sum: rgb = w e V (r = w V for a plain light), a = w.
 #include "sample_maps.glsl"
-layout(binding = 7) uniform sampler2DArray maps;
-layout(std140, binding = 3) uniform LookupBlock {
-    SampleMap samples[16];
-    ivec4 count;
-    vec4 weight;
-} lookup;
+#include "multisample.def"
+layout(binding = UNIT_SAMPLE_MAPS) uniform sampler2DArray maps;
 
 vec4 visibility(Surface s)
 {

@@ -1,5 +1,5 @@
 #include "horizon.glsl"
-layout(binding = 7) uniform sampler2D accumulated;
+layout(binding = UNIT_SOURCE) uniform sampler2D accumulated;
 
 vec4 visibility(Surface s)
 {

@@ -1,6 +1,9 @@
 #include "renderer/passes/draw/screen.h"
 #include "renderer/passes/rays/rays.h"
 
+#define SHARED_ROWS "renderer/techniques/raytraced.def"
+#include "renderer/shared/rows_c.h"
+
 static const char *const weighting_names[] = {"area", "g", NULL};
 
 /* Without Embree there is no "cpu", and "auto" is "gpu". */
@@ -85,8 +88,8 @@ static bool record(struct technique_run *run, struct pen_error *error)
         return false;
     run->work_counted = true;
     struct pass_texture traced[] = {
-        {UNIT_FREE, s->targets.visibility.texture.name, GL_SAMPLE_NEAREST},
-        {UNIT_FREE + 1, s->targets.standard_error.texture.name, GL_SAMPLE_NEAREST}};
+        {UNIT_TRACED, s->targets.visibility.texture.name, GL_SAMPLE_NEAREST},
+        {UNIT_TRACED_ERROR, s->targets.standard_error.texture.name, GL_SAMPLE_NEAREST}};
     struct pass_screen resolve = {
         .name = "trace resolve", .body = "raytraced.glsl", .textures = traced, .texture_count = 2};
     if (!pass_screen(run, &resolve, error))

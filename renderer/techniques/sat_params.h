@@ -29,8 +29,7 @@ static inline bool sat_prepare(struct technique_run *run, const struct sat_table
         .map_size = table->map_size, .margin_texels = min_filter + 1, .one_window = true};
     if (!sat || !pass_classify(run, &classes, &lookup->tiles, error))
         return false;
-    lookup->textures[0] =
-        (struct pass_texture){UNIT_FREE + 1, sat->textures[0].name, GL_SAMPLE_NEAREST};
+    lookup->textures[0] = (struct pass_texture){UNIT_SAT, sat->textures[0].name, GL_SAMPLE_NEAREST};
     lookup->textures[1] =
         (struct pass_texture){UNIT_MIN_MAX, min_max->textures[0].name, GL_SAMPLE_NEAREST};
     return true;

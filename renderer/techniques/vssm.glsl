@@ -31,7 +31,7 @@ bool evaluate(
     vec2 texel = sat_texel();
     if (!exact) {
         low = floor(low + shift);
-        high = clamp(floor(high + shift), vec2(1.0), vec2(sat_info.y));
+        high = clamp(floor(high + shift), vec2(1.0), vec2(sat_info.side));
         low = min(low, high - 1.0);
     }
     vec2 extent = 0.5 * (high - low) * texel;
@@ -112,8 +112,8 @@ Share window_share(vec2 extent, bool exact, vec2 shift, Receiver r)
     int first = P(subdivide) == SUBDIVIDE_UNIFORM ? int(P(levels)) : 0;
     int last = P(subdivide) == SUBDIVIDE_OFF ? 0 : int(P(levels));
     vec2 texel = sat_texel();
-    vec2 low = clamp((r.q - extent - light.rect.xy) / texel, 0.0, sat_info.y);
-    vec2 high = clamp((r.q + extent - light.rect.xy) / texel, 0.0, sat_info.y);
+    vec2 low = clamp((r.q - extent - light.rect.xy) / texel, 0.0, sat_info.side);
+    vec2 high = clamp((r.q + extent - light.rect.xy) / texel, 0.0, sat_info.side);
     vec2 size = high - low;
     float inside = size.x * size.y * texel.x * texel.y / (4.0 * extent.x * extent.y);
     Share sum = Share(1.0 - min(inside, 1.0), 0.0, 0.0);
@@ -147,7 +147,7 @@ Share window_share(vec2 extent, bool exact, vec2 shift, Receiver r)
 vec4 visibility(Surface s)
 {
     vec2 q = light_project(s.p), texel = sat_texel(), least = P(min_filter) * texel;
-    vec2 widest = 0.5 * sat_info.zw * texel;
+    vec2 widest = 0.5 * sat_info.window * texel;
     vec2 bias = P(bias) * s.p.z *
         vec2(1.0 / (light.far_z - light.near_z), light_depth_slope(s.p.z));
     Receiver r = Receiver(

@@ -1,41 +1,15 @@
 /* A bounding volume hierarchy over a scene's triangles, built on the CPU without any library and
  * laid out for a shader: both arrays go into storage buffers as they are (std430).
  *
- *   struct Node     { vec3 low;    uint first;       vec3 high; uint count;       };  // 32 bytes
- *   struct Triangle { vec3 corner; uint flags;       vec3 edge1; uint instance;
- *                     vec3 edge2;  uint first_index; };                               // 48 bytes
- *
  * Node 0 is the root. count 0: an inner node whose children are nodes first and first + 1; else a
  * leaf of triangles first .. first + count - 1. A stack of PEN_BVH_STACK entries is enough for a
  * traversal that pushes the farther child. pen_bvh_occluded is the traversal to copy in GLSL. */
 #pragma once
 #include "renderer/blob/pscene.h"
 
-#define PEN_BVH_STACK 32
-#define PEN_BVH_LEAF 4 /* triangles at most */
-
-struct pen_bvh_node {
-    float low[3];
-    uint32_t first;
-    float high[3];
-    uint32_t count;
-};
-
-enum pen_bvh_flags {
-    PEN_BVH_TWO_SIDED = 1, /* a hit on the back counts too */
-    PEN_BVH_ALPHA = 2,     /* TRACE_CASTS_BY_ALPHA: look up the texture */
-    PEN_BVH_SWAPPED = 4,   /* mirrored instance: corners 1 and 2 are exchanged, so that the front
-                              is where corner, edge1, edge2 run counter-clockwise */
-};
-
-struct pen_bvh_triangle {
-    float corner[3]; /* world, m */
-    uint32_t flags;  /* enum pen_bvh_flags */
-    float edge1[3];
-    uint32_t instance; /* of PSC_INSTANCES */
-    float edge2[3];
-    uint32_t first_index; /* of the triangle in PSC_INDICES */
-};
+/* struct pen_bvh_node, struct pen_bvh_triangle */
+#define SHARED_ROWS "renderer/trace/bvh.def"
+#include "renderer/shared/rows_c.h"
 
 struct pen_bvh {
     struct pen_bvh_node *nodes;         /* at least one: an empty scene has an empty leaf */

@@ -39,14 +39,9 @@ struct pen_trace_scene *pen_trace_scene_create(const struct psc_scene *scene,
 void pen_trace_scene_destroy(struct pen_trace_scene *scene); /* NULL is fine */
 struct pen_trace_scene_info pen_trace_scene_info(const struct pen_trace_scene *scene);
 
-enum pen_trace_light_type {
-    PEN_TRACE_RECT,   /* half-extents `half` along x and y; emits along +z only */
-    PEN_TRACE_DISK,   /* radius half[0]; emits along +z only */
-    PEN_TRACE_SPHERE, /* radius half[0]: a disk through the centre that faces each receiver */
-    PEN_TRACE_SUN,   /* a disk of radius half[0] = tan(angular diameter / 2) at unit distance in the
-                        direction -z; origin is ignored */
-    PEN_TRACE_POINT, /* a spot too: V = 0 outside the cone */
-};
+/* enum pen_trace_light_type */
+#define SHARED_ROWS "renderer/trace/lights.def"
+#include "renderer/shared/rows_c.h"
 
 /* An emitter in its own right-handed frame: x, y, z unit and orthogonal, +z the emission axis. */
 struct pen_trace_light {

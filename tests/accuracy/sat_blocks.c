@@ -77,8 +77,8 @@ static void check_window_means(
     struct sat_block block = {(float)(1 / scale), (float)side, {64, 64}};
     GLuint buffers[3] = {compute_buffer(windows, sizeof windows, GL_SHADER_STORAGE_BUFFER, 0),
         compute_buffer(NULL, sizeof means, GL_SHADER_STORAGE_BUFFER, 1),
-        compute_buffer(&block, sizeof block, GL_UNIFORM_BUFFER, 3)};
-    gl.BindTextureUnit(8, sat->name);
+        compute_buffer(&block, sizeof block, GL_UNIFORM_BUFFER, UBO_EXTRA)};
+    gl.BindTextureUnit(UNIT_SAT, sat->name);
     compute_run((const char *const[]){"light.glsl", "sat.glsl", NULL}, window_main, COUNT / 64);
     gl.GetNamedBufferSubData(buffers[1], 0, sizeof means, means);
     double worst = 0;
@@ -140,8 +140,8 @@ static void check_two_planes_in_table(void)
     struct sat_block block = {(float)(1 / scale), SIDE, {64, 64}};
     GLuint buffers[3] = {compute_buffer(windows, sizeof windows, GL_SHADER_STORAGE_BUFFER, 0),
         compute_buffer(NULL, sizeof results, GL_SHADER_STORAGE_BUFFER, 1),
-        compute_buffer(&block, sizeof block, GL_UNIFORM_BUFFER, 3)};
-    gl.BindTextureUnit(8, to.name);
+        compute_buffer(&block, sizeof block, GL_UNIFORM_BUFFER, UBO_EXTRA)};
+    gl.BindTextureUnit(UNIT_SAT, to.name);
     compute_run((const char *const[]){"light.glsl", "sat.glsl", "moments.glsl", NULL}, planes_main,
         COUNT / 64);
     gl.GetNamedBufferSubData(buffers[1], 0, sizeof results, results);

@@ -20,7 +20,7 @@ CXX_SHIMS = ["renderer/import/*.cpp", "renderer/encode/*.cpp"]
 RULES = [
     (r"protocol/(%s)\.[ch]" % "|".join(BASICS), FLOOR_1, [], "pure"),
     (r"protocol/.*", ["protocol/*"], ["cjson/cJSON.h"], "pure"),
-    (r"renderer/blob/.*", FLOOR_1 + ["renderer/blob/*"], [], "system"),
+    (r"renderer/blob/.*", FLOOR_1 + ["renderer/blob/*", "renderer/shared/*"], [], "system"),
     (r"renderer/generate/.*", FLOOR_1 + ["renderer/blob/*", "renderer/generate/*"],
      ["cglm/*"], "system"),
     (r"renderer/import/.*",

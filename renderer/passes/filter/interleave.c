@@ -22,7 +22,7 @@ static bool interleaved(
     struct pass_screen first = *pass;
     first.defines = defines;
     first.framebuffer = target->framebuffer;
-    struct pass_texture source = {UNIT_FREE, target->texture.name, GL_SAMPLE_NEAREST};
+    struct pass_texture source = {UNIT_SOURCE, target->texture.name, GL_SAMPLE_NEAREST};
     struct pass_screen second = {.name = "interleave",
         .body = "interleave.glsl",
         .defines = colour ? "#define COLOUR\n" : NULL,

@@ -2,19 +2,16 @@
 #include <math.h>
 #include <stdio.h>
 
-/* As SampleBlock in light_samples.glsl. */
-struct sample_block {
-    struct sample_map samples[SAMPLE_MAP_BATCH];
-    int32_t range[4];
-    float cell[4];
-};
+#define SHARED_ROWS "renderer/shaders/filter/filter.def"
+#include "renderer/shared/rows_c.h"
+#define SHARED_ROWS "renderer/shaders/filter/light_samples.def"
+#include "renderer/shared/rows_c.h"
 
 static bool look_up(struct technique_run *run, const struct sample_block *block,
     const struct gl_texture *maps, bool sparse, bool emitted, struct pen_error *error)
 {
-    struct pass_texture textures[] = {{UNIT_FREE, maps->name, GL_SAMPLE_NEAREST_BORDER},
-        {UNIT_FREE + 1, pass_penumbra_target(run, PENUMBRA_SPREAD)->texture.name,
-            GL_SAMPLE_NEAREST}};
+    struct pass_texture textures[] = {{UNIT_SAMPLE_MAPS, maps->name, GL_SAMPLE_NEAREST_BORDER},
+        {UNIT_SPREAD, pass_penumbra_target(run, PENUMBRA_SPREAD)->texture.name, GL_SAMPLE_NEAREST}};
     const struct gl_target *target =
         pass_penumbra_target(run, emitted ? PENUMBRA_ALL : PENUMBRA_LIT);
     char defines[64];

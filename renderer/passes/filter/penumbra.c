@@ -5,6 +5,11 @@
 #include "renderer/passes/map/min_max.h"
 #include <stdio.h>
 
+#define SHARED_ROWS "renderer/shaders/filter/filter.def"
+#include "renderer/shared/rows_c.h"
+#define SHARED_ROWS "renderer/shaders/filter/atrous.def"
+#include "renderer/shared/rows_c.h"
+
 static struct gl_target *targets(struct technique_run *run)
 {
     static const struct pass_targets key = {PENUMBRA_TARGETS};
@@ -116,9 +121,9 @@ static bool filter(struct technique_run *run, const struct step *step, struct pe
     struct pass_texture textures[] = {
         {UNIT_DEPTH, run->gbuffer->depth.texture.name, GL_SAMPLE_NEAREST},
         {UNIT_NORMAL, run->gbuffer->normal.texture.name, GL_SAMPLE_NEAREST},
-        {UNIT_FREE, all[PENUMBRA_SPREAD].texture.name, GL_SAMPLE_NEAREST},
-        {UNIT_FREE + 1, all[base].texture.name, GL_SAMPLE_NEAREST},
-        {UNIT_FREE + 2, all[base + 1].texture.name, GL_SAMPLE_NEAREST}};
+        {UNIT_SPREAD, all[PENUMBRA_SPREAD].texture.name, GL_SAMPLE_NEAREST},
+        {UNIT_RATIO_LIT, all[base].texture.name, GL_SAMPLE_NEAREST},
+        {UNIT_RATIO_ALL, all[base + 1].texture.name, GL_SAMPLE_NEAREST}};
     bool ok = pass_fill(run->ctx,
         &(struct pass_fill){.name = step->name,
             .fragment = step->fragment,
@@ -162,14 +167,14 @@ bool pass_penumbra_atrous(struct technique_run *run, uint32_t levels, struct pen
         return true;
     uint32_t passes = levels ? levels : 1;
     for (uint32_t i = 0; i < passes; i++) {
-        int32_t block[4] = {1 << i, levels ? 2 : -1};
+        struct atrous_block block = {.step = {1 << i, levels ? 2 : -1}};
         struct step step = {.name = "a-trous",
             .fragment = "atrous.frag",
             .defines = "",
             .source = PENUMBRA_SAMPLES,
             .from_next = i & 1,
             .last = i + 1 == passes,
-            .extra = block,
+            .extra = &block,
             .extra_bytes = sizeof block};
         if (!filter(run, &step, error))
             return false;

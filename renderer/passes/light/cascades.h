@@ -5,7 +5,6 @@
 #include "renderer/passes/light/sample_maps.h"
 
 #define CASCADES 3
-#define CASCADE_MAX_SIDE 8
 
 enum cascade_split {
     CASCADE_SPLIT_PRACTICAL, /* Zhang et al. 2006 */

@@ -27,7 +27,7 @@ static bool build(struct technique_run *run, const struct shadow_key *key,
     struct gl_texture rows = gl_texture_create(GL_RGBA32F, key->size, key->size, 0, 1);
     input->textures[0] = gl_texture_create(GL_RGBA32F, key->size, key->size, 0, 1);
     struct pass_texture emission = {UNIT_EMISSION, run->emission->name, GL_SAMPLE_TRILINEAR};
-    struct pass_texture from_rows = {UNIT_FREE, rows.name, GL_SAMPLE_NEAREST};
+    struct pass_texture from_rows = {UNIT_SOURCE, rows.name, GL_SAMPLE_NEAREST};
     bool ok = sum(run, &rows, &emission, "#define ROWS\n", error) &&
               sum(run, &input->textures[0], &from_rows, NULL, error);
     gl_texture_destroy(&rows);

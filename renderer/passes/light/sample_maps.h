@@ -3,7 +3,8 @@
 #pragma once
 #include "renderer/technique.h"
 
-#define SAMPLE_MAP_BATCH 16
+#define SHARED_ROWS "renderer/shaders/light/sample_map.def"
+#include "renderer/shared/rows_c.h"
 
 struct sample_point {
     float at[2]; /* emitter coordinates, m (parallel: tangents) */
@@ -17,15 +18,6 @@ struct sample_point sample_point_at(const struct light_face *face, float u, floa
 /* `count` points of the Hammersley set (radical inverse in base 2) over the face's emitter. */
 void sample_points(const struct light_face *face, uint32_t count, struct sample_point *points);
 
-/* What the lookup needs per sample; std140 array element. As SampleMap in sample_maps.glsl. */
-struct sample_map {
-    float at[4]; /* xy: emitter position; zw: the same in [-1, 1]^2 */
-    /* Map uv = l * window.xy + window.zw, l on the map plane seen from the sample. */
-    float window[4];
-    /* x: layer, negative: nothing casts there; y: weight; z: side of the part of the emitter that
-     * it stands for, in uv (2: all of it); w: the method's own. */
-    float layer[4];
-};
 struct sample_map sample_map_entry(
     const struct sample_point *point, const float rect[4], uint32_t layer);
 

@@ -1,10 +1,7 @@
 #include "renderer/passes/map/blur.h"
 #include "renderer/passes/draw/screen.h"
 #include <math.h>
-
-struct blur_block {
-    float step[4], weights[BLUR_MAX_RADIUS + 1];
-};
+#include <string.h>
 
 void blur_weights(uint32_t radius, float weights[BLUR_MAX_RADIUS + 1])
 {
@@ -23,8 +20,11 @@ static bool run(struct technique_ctx *ctx, const struct gl_texture *from, GLuint
     struct blur_block block = {0};
     block.step[axis] = 1 / (float)(axis ? from->height : from->width);
     block.step[2] = (float)radius;
-    blur_weights(radius, block.weights);
-    struct pass_texture source = {UNIT_FREE, from->name, GL_SAMPLE_NEAREST};
+    float weights[BLUR_MAX_RADIUS + 1];
+    blur_weights(radius, weights);
+    _Static_assert(sizeof weights == sizeof block.weights, "a weight for every distance");
+    memcpy(block.weights, weights, sizeof weights);
+    struct pass_texture source = {UNIT_SOURCE, from->name, GL_SAMPLE_NEAREST};
     return pass_fill(ctx,
         &(struct pass_fill){.name = "blur",
             .fragment = "blur.frag",

@@ -2,7 +2,9 @@
 #pragma once
 #include "renderer/technique.h"
 
-#define BLUR_MAX_RADIUS 15
+/* BLUR_MAX_RADIUS */
+#define SHARED_ROWS "renderer/shaders/map/blur.def"
+#include "renderer/shared/rows_c.h"
 
 /* Weights of distance 0 to `radius` (texels) of a symmetric kernel that sums to 1 over 2 radius + 1
  * texels: a Gaussian whose standard deviation is half of radius + 1/2. */

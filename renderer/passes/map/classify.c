@@ -5,10 +5,8 @@
 #include "renderer/passes/map/min_max.h"
 #include <stdlib.h>
 
-struct classify_block {
-    float margin[4];
-    int32_t tile[4];
-};
+#define SHARED_ROWS "renderer/shaders/screen/classify.def"
+#include "renderer/shared/rows_c.h"
 
 /* Adds up the receivers of each class. Reads 2 bytes per 64 pixels back. */
 static void count_classes(struct technique_run *run, const struct gl_texture *tiles)

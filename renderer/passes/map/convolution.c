@@ -12,7 +12,7 @@ static double series(const struct convolution_block *block, double x)
 {
     double f = 0.5;
     for (int k = 0; k < CONVOLUTION_MAX_TERMS; k++)
-        f += (double)block->weight[k] * sin(M_PI * (2 * k + 1) * x);
+        f += (double)block->weight[k / 4][k % 4] * sin(M_PI * (2 * k + 1) * x);
     return f;
 }
 
@@ -21,7 +21,8 @@ struct convolution_block convolution_constants(const struct convolution_desc *de
     struct convolution_block block = {.offset = desc->offset / (float)desc->terms};
     for (uint32_t k = 0; k < desc->terms; k++) {
         double part = (double)(k + 1) / desc->terms;
-        block.weight[k] = (float)(2 / (M_PI * (2 * k + 1)) * exp(-desc->damping * part * part));
+        block.weight[k / 4][k % 4] =
+            (float)(2 / (M_PI * (2 * k + 1)) * exp(-desc->damping * part * part));
     }
     /* The series has period 2: a gap of 1 - x looks like one of x. Gaps plus offset stay below
      * 1 - offset, so the lit side is seen between the offset and its mirror image only. */
@@ -53,11 +54,8 @@ void convolution_fit(struct convolution_block *block, const struct convolution_d
     block->table_scale = (float)(1 / fmin(floor(4294967295.0 / texels), 1 << 22));
 }
 
-struct basis_block {
-    float range;
-    int32_t first_term, terms;
-    float table_scale;
-};
+#define SHARED_ROWS "renderer/shaders/map/basis.def"
+#include "renderer/shared/rows_c.h"
 
 static bool fill(struct technique_run *run, const struct gl_texture *map, struct gl_texture *array,
     const struct convolution_desc *desc, uint32_t series_layers, bool weighted,
@@ -66,7 +64,7 @@ static bool fill(struct technique_run *run, const struct gl_texture *map, struct
     static const char *const defines[2][2] = {
         {NULL, "#define WEIGHTED\n"}, {"#define TABLES\n", "#define TABLES\n#define WEIGHTED\n"}};
     bool tables = desc->format == CONVOLUTION_TABLES;
-    struct pass_texture from = {UNIT_FREE, map->name, GL_SAMPLE_NEAREST};
+    struct pass_texture from = {UNIT_SOURCE, map->name, GL_SAMPLE_NEAREST};
     struct convolution_block constants = convolution_constants(desc);
     convolution_fit(&constants, desc, run->face);
     struct basis_block block = {.range = constants.range,

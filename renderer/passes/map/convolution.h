@@ -3,7 +3,9 @@
 #pragma once
 #include "renderer/passes/map/shadow_cache.h"
 
-#define CONVOLUTION_MAX_TERMS 16
+/* struct convolution_block */
+#define SHARED_ROWS "renderer/shaders/lookup/convolution.def"
+#include "renderer/shared/rows_c.h"
 
 /* How the maps are stored and filtered: with mips, or as modular summed-area tables of 32-bit
  * integers (passes/map/sat.h), whose windows are exact boxes. */
@@ -20,16 +22,6 @@ struct convolution_desc {
     bool contact;    /* lookups are measured against their nearest caster; not the maps' */
 };
 
-/* As ConvolutionBlock in convolution.glsl. */
-struct convolution_block {
-    /* 2 / c_k exp(-alpha (k / M)^2), c_k = (2k - 1) pi; 0 past M. */
-    float weight[CONVOLUTION_MAX_TERMS];
-    float range;       /* the depth range is scaled to [0, range], so that no gap folds back */
-    float offset;      /* in scaled depth */
-    float low, scale;  /* V = (f - low) * scale: what the ripple leaves of 0 and 1 */
-    float table_scale; /* of one unit of a table */
-    float pad[3];
-};
 struct convolution_block convolution_constants(const struct convolution_desc *desc);
 
 /* Fills in what depends on the light. */

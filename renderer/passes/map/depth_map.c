@@ -29,7 +29,7 @@ static bool draw(struct technique_run *run, GLuint framebuffer, uint32_t size,
     if (layer_before) {
         /* Behind the first layer the far sides count too: they close the casters. */
         cull.cull_back = false;
-        gl.BindTextureUnit(UNIT_FREE, layer_before);
+        gl.BindTextureUnit(UNIT_SOURCE, layer_before);
     }
     GLuint programs[] = {pass.opaque, pass.textured};
     for (int i = 0; i < 2; i++)

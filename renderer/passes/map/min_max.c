@@ -4,6 +4,9 @@
 #include "renderer/passes/map/shadow_cache.h"
 #include <stdio.h>
 
+#define SHARED_ROWS "renderer/shaders/map/level.def"
+#include "renderer/shared/rows_c.h"
+
 bool pass_min_max_levels(struct technique_ctx *ctx, const struct gl_texture *depth, uint32_t size,
     const struct gl_texture *pyramid, struct pen_error *error)
 {
@@ -15,8 +18,8 @@ bool pass_min_max_levels(struct technique_ctx *ctx, const struct gl_texture *dep
     for (uint32_t level = 0; ok && level < pyramid->levels; level++) {
         gl.NamedFramebufferTexture(framebuffer, GL_COLOR_ATTACHMENT0, pyramid->name, (GLint)level);
         struct pass_texture from = {
-            UNIT_FREE, level ? pyramid->name : depth->name, GL_SAMPLE_NEAREST};
-        int32_t source_level[4] = {level ? (int32_t)level - 1 : 0};
+            UNIT_SOURCE, level ? pyramid->name : depth->name, GL_SAMPLE_NEAREST};
+        struct level_block source = {.level = {level ? (int32_t)level - 1 : 0}};
         uint32_t width = pyramid->width >> level ? pyramid->width >> level : 1;
         uint32_t below = level ? pyramid->width >> (level - 1) : size; /* side of the source */
         bool even = below > 1 && below % 2 == 0;
@@ -30,8 +33,8 @@ bool pass_min_max_levels(struct technique_ctx *ctx, const struct gl_texture *dep
                 .framebuffer = framebuffer,
                 .width = width,
                 .height = width,
-                .extra = source_level,
-                .extra_bytes = sizeof source_level},
+                .extra = &source,
+                .extra_bytes = sizeof source},
             error);
     }
     gl.DeleteFramebuffers(1, &framebuffer);

@@ -5,6 +5,9 @@
 #include "renderer/passes/map/depth_map.h"
 #include <string.h>
 
+#define SHARED_ROWS "renderer/shaders/map/moments.def"
+#include "renderer/shared/rows_c.h"
+
 enum { KEY_KIND, KEY_BLUR, KEY_EXPONENTS };
 
 static bool build(struct technique_run *run, const struct shadow_key *key,
@@ -21,9 +24,9 @@ static bool build(struct technique_run *run, const struct shadow_key *key,
     struct gl_texture *map = &input->textures[0];
     *map = gl_texture_create(formats[kind], side, side, 0, 0);
     GLuint framebuffer = gl_framebuffer_create(&(const struct gl_texture *){map}, 1, NULL);
-    float exponents[4] = {0, 0, (float)margin};
-    memcpy(exponents, &key->extra[KEY_EXPONENTS], 8);
-    struct pass_texture source = {UNIT_FREE, depth->textures[0].name, GL_SAMPLE_NEAREST};
+    struct moment_block block = {.exponents = {0, 0, (float)margin}};
+    memcpy(block.exponents, &key->extra[KEY_EXPONENTS], 8);
+    struct pass_texture source = {UNIT_SOURCE, depth->textures[0].name, GL_SAMPLE_NEAREST};
     bool ok = pass_fill(run->ctx,
         &(struct pass_fill){.name = "moments",
             .fragment = "moments.frag",
@@ -34,8 +37,8 @@ static bool build(struct technique_run *run, const struct shadow_key *key,
             .framebuffer = framebuffer,
             .width = side,
             .height = side,
-            .extra = exponents,
-            .extra_bytes = sizeof exponents},
+            .extra = &block,
+            .extra_bytes = sizeof block},
         error);
     gl.DeleteFramebuffers(1, &framebuffer);
     return ok && pass_blur(run->ctx, map, key->extra[KEY_BLUR], error);

@@ -2,6 +2,9 @@
 #include "renderer/passes/draw/screen.h"
 #include "renderer/passes/map/depth_map.h"
 
+#define SHARED_ROWS "renderer/shaders/map/level.def"
+#include "renderer/shared/rows_c.h"
+
 static void copy_layer(const struct gl_texture *from, const struct gl_texture *to, uint32_t layer)
 {
     GLsizei side = (GLsizei)from->width;
@@ -46,8 +49,8 @@ static bool build_pyramid(struct technique_run *run, const struct gl_texture *ma
         gl.NamedFramebufferTextureLayer(
             framebuffer, GL_COLOR_ATTACHMENT0, pyramid->name, (GLint)level, (GLint)layer);
         struct pass_texture from = {
-            UNIT_FREE, level ? pyramid->name : maps->name, GL_SAMPLE_NEAREST};
-        int32_t source[4] = {level ? (int32_t)level - 1 : 0, (int32_t)layer};
+            UNIT_SOURCE, level ? pyramid->name : maps->name, GL_SAMPLE_NEAREST};
+        struct level_block source = {.level = {level ? (int32_t)level - 1 : 0, (int32_t)layer}};
         ok = pass_fill(run->ctx,
             &(struct pass_fill){.name = "layer pyramid",
                 .fragment = "layer_pyramid.frag",
@@ -58,7 +61,7 @@ static bool build_pyramid(struct technique_run *run, const struct gl_texture *ma
                 .framebuffer = framebuffer,
                 .width = side,
                 .height = side,
-                .extra = source,
+                .extra = &source,
                 .extra_bytes = sizeof source},
             error);
     }

@@ -5,6 +5,11 @@
 #include <stdlib.h>
 #include <string.h>
 
+#define SHARED_ROWS "renderer/shaders/map/sat_scan.def"
+#include "renderer/shared/rows_c.h"
+#define SHARED_ROWS "renderer/shaders/map/sat_moments.def"
+#include "renderer/shared/rows_c.h"
+
 static uint32_t components(GLenum format)
 {
     return format == GL_RGBA32UI ? 4 : 2;
@@ -43,8 +48,8 @@ static void dispatch(
     GLuint program, const struct gl_texture *from, const struct gl_texture *to, uint32_t lines)
 {
     gl.UseProgram(program);
-    gl.BindTextureUnit(UNIT_FREE, from->name);
-    gl.BindImageTexture(0, to->name, 0, GL_FALSE, 0, GL_WRITE_ONLY, to->format);
+    gl.BindTextureUnit(UNIT_SOURCE, from->name);
+    gl.BindImageTexture(IMAGE_SUMS, to->name, 0, GL_FALSE, 0, GL_WRITE_ONLY, to->format);
     gl.DispatchCompute(lines, 1, 1);
     gl.MemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT | GL_TEXTURE_UPDATE_BARRIER_BIT |
                      GL_SHADER_IMAGE_ACCESS_BARRIER_BIT);
@@ -68,10 +73,10 @@ static bool scan_on_device(struct technique_ctx *ctx, const struct gl_texture *f
     GLenum layout = components(to->format) == 4 ? GL_RGBA_INTEGER : GL_RG_INTEGER;
     struct gl_texture rows = gl_texture_create(from->format, from->width, from->width, 0, 1);
     gl.ClearTexImage(to->name, 0, layout, GL_UNSIGNED_INT, zero);
-    gl.BindSampler(UNIT_FREE, 0);
+    gl.BindSampler(UNIT_SOURCE, 0);
     dispatch(programs[0], from, &rows, from->width);
     dispatch(programs[1], &rows, to, from->width);
-    gl.BindTextureUnit(UNIT_FREE, 0);
+    gl.BindTextureUnit(UNIT_SOURCE, 0);
     gl_texture_destroy(&rows);
     return true;
 }
@@ -122,9 +127,9 @@ static bool build(struct technique_run *run, const struct shadow_key *key,
     GLenum format = kind == SAT_FOUR_MOMENTS ? GL_RGBA32UI : GL_RG32UI;
     struct gl_texture moments = gl_texture_create(format, side, side, 0, 1);
     GLuint framebuffer = gl_framebuffer_create(&(const struct gl_texture *){&moments}, 1, NULL);
-    struct pass_texture source = {UNIT_FREE, depth->textures[0].name, GL_SAMPLE_NEAREST};
-    float extra[4] = {0, (float)(key->size / side)};
-    memcpy(&extra[0], &key->extra[KEY_SCALE], 4);
+    struct pass_texture source = {UNIT_SOURCE, depth->textures[0].name, GL_SAMPLE_NEAREST};
+    struct scale_block block = {.scale = {0, (float)(key->size / side)}};
+    memcpy(&block.scale[0], &key->extra[KEY_SCALE], 4);
     input->textures[0] = gl_texture_create(format, side + 1, side + 1, 0, 1);
     bool ok = pass_fill(run->ctx,
                   &(struct pass_fill){.name = "moments",
@@ -136,8 +141,8 @@ static bool build(struct technique_run *run, const struct shadow_key *key,
                       .framebuffer = framebuffer,
                       .width = side,
                       .height = side,
-                      .extra = extra,
-                      .extra_bytes = sizeof extra},
+                      .extra = &block,
+                      .extra_bytes = sizeof block},
                   error) &&
               sat_scan(run->ctx, &moments, &input->textures[0], key->extra[KEY_PATH], error);
     gl.DeleteFramebuffers(1, &framebuffer);

@@ -29,12 +29,9 @@ struct sat_table {
     enum sat_path path;
 };
 
-/* As the uniform block of sat.glsl. */
-struct sat_block {
-    float inverse_scale;
-    float side;      /* texels of the table, 1 less than its texture's */
-    float window[2]; /* widest window that may be asked for, texels */
-};
+/* struct sat_block */
+#define SHARED_ROWS "renderer/shaders/lookup/sat.def"
+#include "renderer/shared/rows_c.h"
 
 /* The table in textures[0]. Kept between requests. Fills *block. */
 const struct shadow_input *pass_sat(struct technique_run *run, const struct sat_table *table,

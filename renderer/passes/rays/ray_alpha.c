@@ -3,8 +3,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { WORD_FACTOR, WORD_CUTOFF, WORD_FIRST, WORD_WIDTH, WORD_HEIGHT, WORD_FLAGS, WORDS = 8 };
-enum { FLAG_BLEND = 1, FLAG_NEAREST = 2, WRAP_S_SHIFT = 8, WRAP_T_SHIFT = 16 };
 #define NO_TEXELS UINT32_MAX
 
 static const struct psc_material *material_of(const struct psc_scene *scene, uint32_t instance)

@@ -2,11 +2,9 @@
 #pragma once
 #include "renderer/trace/bvh.h"
 
-struct ray_alpha_triangle { /* std430, 40 bytes */
-    float uv[3][2];         /* of the base texture, transform applied */
-    float a[3];             /* vertex alpha */
-    uint32_t material;
-};
+/* struct ray_alpha_triangle */
+#define SHARED_ROWS "renderer/shaders/rays/ray_alpha.def"
+#include "renderer/shared/rows_c.h"
 
 struct ray_alpha {
     struct ray_alpha_triangle *triangles;

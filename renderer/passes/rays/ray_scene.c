@@ -99,10 +99,11 @@ const struct ray_scene *ray_scene_get(struct technique_run *run, struct pen_erro
 
 void ray_scene_bind(const struct ray_scene *s)
 {
-    gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, s->nodes);
-    gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 1, s->triangles);
+    gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, STORAGE_RAY_NODES, s->nodes);
+    gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, STORAGE_RAY_TRIANGLES, s->triangles);
     if (s->alpha_triangles) {
-        gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 6, s->alpha_triangles);
-        gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 7, s->alpha_words);
+        gl.BindBufferBase(
+            GL_SHADER_STORAGE_BUFFER, STORAGE_RAY_ALPHA_TRIANGLES, s->alpha_triangles);
+        gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, STORAGE_RAY_ALPHA_WORDS, s->alpha_words);
     }
 }

@@ -3,6 +3,10 @@
 #pragma once
 #include "renderer/technique.h"
 
+/* Binding points of all that is about rays. */
+#define SHARED_ROWS "renderer/shaders/rays/rays.def"
+#include "renderer/shared/rows_c.h"
+
 struct ray_scene {
     GLuint nodes, triangles;             /* ray_bvh.glsl */
     GLuint alpha_triangles, alpha_words; /* ray_alpha.glsl; 0 without alpha */
@@ -13,4 +17,4 @@ struct ray_scene {
 /* Its memory counts as the scene's. Errors: PEN_TOO_BIG when it does not fit the budget or a
  * storage buffer of this device, PEN_INTERNAL. */
 const struct ray_scene *ray_scene_get(struct technique_run *run, struct pen_error *error);
-void ray_scene_bind(const struct ray_scene *scene); /* storage buffers 0, 1, 6, 7 */
+void ray_scene_bind(const struct ray_scene *scene);

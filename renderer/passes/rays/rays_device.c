@@ -8,28 +8,15 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define TILE 8u                      /* local_size of the shaders over pixels */
-#define GROUP 64u                    /* and of the one over the list */
 #define RAYS_PER_DISPATCH (1u << 21) /* milliseconds on a GPU */
 #define RECEIVERS_PER_DISPATCH (1u << 17)
 #define POINTS_PER_DISPATCH (1u << 12) /* one invocation takes them one after the other */
 #define POINTS_ON_SOFTWARE 16u /* leaves 4096 turns of llvmpipe's loops for a ray: ray_bvh.glsl */
-#define STATE_BYTES 32u        /* struct RaySums */
 
-enum { BUFFER_POINTS = 2, BUFFER_STATE, BUFFER_LIST, BUFFER_COUNTERS };
-enum { IMAGE_VISIBILITY, IMAGE_ERROR, IMAGE_MARKS };
-enum { UNIT_VERDICTS = UNIT_FREE + 2, UNIT_SPREAD };
-
-/* As RayBlock of ray_job.glsl. */
-struct ray_block {
-    float origin[4], a[4], b[4], z[4], mean[4], eye[4], bias[4];
-    uint32_t net[4], pretest[4], size[4];
-};
-
-/* As RayCounters. */
-struct ray_counters {
-    uint32_t rays_low, rays_high, full_pixels, list_count, cut;
-};
+#define SHARED_ROWS "renderer/shaders/rays/ray_job.def"
+#include "renderer/shared/rows_c.h"
+#define SHARED_ROWS "renderer/shaders/rays/ray_samples.def"
+#include "renderer/shared/rows_c.h"
 
 struct work {
     struct technique_run *run;
@@ -142,7 +129,7 @@ static bool prepare(struct work *w, struct pen_error *error)
     fill_buffer(&t->job, sizeof block, &block);
     fill_buffer(&t->list, (GLsizeiptr)4 * width * height, NULL);
     fill_buffer(&t->counters, sizeof(struct ray_counters), &(struct ray_counters){0});
-    fill_buffer(&t->state, (GLsizeiptr)STATE_BYTES * RECEIVERS_PER_DISPATCH, NULL);
+    fill_buffer(&t->state, (GLsizeiptr)sizeof(struct ray_sums) * RECEIVERS_PER_DISPATCH, NULL);
     return true;
 }
 
@@ -156,18 +143,18 @@ static void bind(const struct work *w)
     const struct ray_targets *t = w->targets;
     ray_scene_bind(w->scene);
     gl.BindBufferBase(GL_UNIFORM_BUFFER, UBO_EXTRA, t->job);
-    gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, BUFFER_POINTS, t->points);
-    gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, BUFFER_STATE, t->state);
-    gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, BUFFER_LIST, t->list);
-    gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, BUFFER_COUNTERS, t->counters);
+    gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, STORAGE_RAY_POINTS, t->points);
+    gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, STORAGE_RAY_STATE, t->state);
+    gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, STORAGE_RAY_LIST, t->list);
+    gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, STORAGE_RAY_COUNTERS, t->counters);
     bind_image(IMAGE_VISIBILITY, &t->visibility.texture);
     bind_image(IMAGE_ERROR, &t->standard_error.texture);
-    gl.BindTextureUnit(UNIT_FREE, t->receivers[0].texture.name);
-    gl.BindTextureUnit(UNIT_FREE + 1, t->receivers[1].texture.name);
-    gl.BindTextureUnit(UNIT_VERDICTS, t->verdicts.texture.name);
-    gl.BindTextureUnit(UNIT_SPREAD, t->spread.texture.name);
+    gl.BindTextureUnit(UNIT_RAY_POSITION, t->receivers[0].texture.name);
+    gl.BindTextureUnit(UNIT_RAY_NORMAL, t->receivers[1].texture.name);
+    gl.BindTextureUnit(UNIT_RAY_VERDICTS, t->verdicts.texture.name);
+    gl.BindTextureUnit(UNIT_RAY_SPREAD, t->spread.texture.name);
     gl.BindTextureUnit(UNIT_EMISSION, w->run->emission->name);
-    for (GLuint unit = UNIT_FREE; unit <= UNIT_SPREAD; unit++)
+    for (GLuint unit = UNIT_RAY_POSITION; unit < UNIT_RAY_END; unit++)
         gl.BindSampler(unit, 0);
     gl.BindSampler(UNIT_EMISSION, w->run->ctx->samplers.names[GL_SAMPLE_LINEAR]);
 }
@@ -175,22 +162,22 @@ static void bind(const struct work *w)
 /* A few rays for all, in bands of rows. */
 static bool pretest(struct work *w, struct pen_error *error)
 {
-    uint32_t height = w->run->height, columns = groups(w->run->width, TILE);
-    uint32_t row_rays = columns * TILE * TILE * (TRACE_PRETEST_NET + TRACE_PRETEST_RIM);
+    uint32_t height = w->run->height, columns = groups(w->run->width, RAY_TILE);
+    uint32_t row_rays = columns * RAY_TILE * RAY_TILE * (TRACE_PRETEST_NET + TRACE_PRETEST_RIM);
     uint32_t rows = row_rays < RAYS_PER_DISPATCH ? RAYS_PER_DISPATCH / row_rays : 1;
     GLuint name = program(w, "ray_pretest.comp", error);
     if (!name)
         return false;
     bind_image(IMAGE_MARKS, &w->targets->verdicts.texture);
-    for (uint32_t y = 0; y < height; y += rows * TILE) {
-        uint32_t left = groups(height - y, TILE);
+    for (uint32_t y = 0; y < height; y += rows * RAY_TILE) {
+        uint32_t left = groups(height - y, RAY_TILE);
         gl.ProgramUniform1ui(name, LOCATION_FIRST_ROW, y);
         dispatch(columns, left < rows ? left : rows);
     }
     if (!program(w, "ray_spread.comp", error))
         return false;
     bind_image(IMAGE_MARKS, &w->targets->spread.texture);
-    dispatch(columns, groups(height, TILE));
+    dispatch(columns, groups(height, RAY_TILE));
     return true;
 }
 
@@ -206,7 +193,7 @@ static bool select_receivers(struct work *w, struct pen_error *error)
 {
     if (!program(w, "ray_select.comp", error))
         return false;
-    dispatch(groups(w->run->width, TILE), groups(w->run->height, TILE));
+    dispatch(groups(w->run->width, RAY_TILE), groups(w->run->height, RAY_TILE));
     w->listed = read_counters(w).list_count;
     return true;
 }
@@ -230,7 +217,7 @@ static void sample_range(const struct work *w, GLuint name, uint32_t first, uint
                 !last                     ? 0u
                 : b + 1 == p->block_count ? 2u
                                           : 1u);
-            dispatch(groups(count, GROUP), 1);
+            dispatch(groups(count, RAY_GROUP), 1);
         }
         point = end;
     }
@@ -264,7 +251,7 @@ static void add_counts(const struct work *w)
 
 static void unbind(void)
 {
-    for (GLuint unit = UNIT_FREE; unit <= UNIT_SPREAD; unit++)
+    for (GLuint unit = UNIT_RAY_POSITION; unit < UNIT_RAY_END; unit++)
         gl.BindTextureUnit(unit, 0);
     gl.BindSampler(UNIT_EMISSION, 0);
 }

@@ -3,9 +3,7 @@
 // Mehta et al. 2012), so that contacts stay sharp. Needs P(blur), P(depth_sigma), P(normal_power).
 #include "surface_difference.glsl"
 #include "light_ratio.glsl"
-layout(std140, binding = 3) uniform LevelBlock {
-    ivec4 step; // x: pixels between taps; y: taps to each side, -1: none at all
-} level;
+#include "atrous.def"
 
 void main()
 {

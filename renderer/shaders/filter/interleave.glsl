@@ -2,9 +2,9 @@
 // infinite depth is linear over the screen for a plane, so a depth gradient predicts neighbours.
 #include "interleave_colour.glsl"
 #ifdef COLOUR
-layout(binding = 7) uniform sampler2D interleaved; // as interleave_colour
+layout(binding = UNIT_SOURCE) uniform sampler2D interleaved; // as interleave_colour
 #else
-layout(binding = 7) uniform sampler2D interleaved; // V, width of the penumbra, px
+layout(binding = UNIT_SOURCE) uniform sampler2D interleaved; // V, width of the penumbra, px
 #endif
 
 // rgb coloured, a mean visibility; the width of the penumbra.

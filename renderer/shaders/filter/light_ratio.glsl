@@ -5,15 +5,16 @@
 //   plain light:       ratio_lit.r arrived, ratio_lit.g of
 //   TEXTURED:          ratio_lit rgb and a (mean) arrived, ratio_all rgb and a of
 //   FROM_HARD:         the hard visibility of penumbra_estimate.glsl
+#include "filter.def"
 #include "light.glsl"
 #ifdef LAST
 #include "pixel_horizon.glsl"
 #endif
-layout(binding = 7) uniform sampler2D spread_map; // see penumbra_estimate.glsl
+layout(binding = UNIT_SPREAD) uniform sampler2D spread_map; // see penumbra_estimate.glsl
 #ifndef FROM_HARD
-layout(binding = 8) uniform sampler2D ratio_lit;
+layout(binding = UNIT_RATIO_LIT) uniform sampler2D ratio_lit;
 #ifdef TEXTURED
-layout(binding = 9) uniform sampler2D ratio_all;
+layout(binding = UNIT_RATIO_ALL) uniform sampler2D ratio_all;
 #endif
 #endif
 

@@ -4,18 +4,9 @@
 #ifdef SPARSE
 #include "dither.glsl"
 #endif
-layout(binding = 7) uniform sampler2DArray maps;
-layout(binding = 8) uniform sampler2D spread_map; // see penumbra_estimate.glsl
-struct SampleMap {
-    vec4 at;     // xy emitter position, zw the same in [-1, 1]^2
-    vec4 window; // uv = l * xy + zw
-    vec4 emission;
-};
-layout(std140, binding = 3) uniform SampleBlock {
-    SampleMap samples[16];
-    ivec4 range; // samples of this batch, number of the first, samples in all
-    vec4 cell;   // x: side of the emitter's part that a sample stands for, in [-1, 1]; y: its weight
-} batch;
+#include "light_samples.def"
+layout(binding = UNIT_SAMPLE_MAPS) uniform sampler2DArray maps;
+layout(binding = UNIT_SPREAD) uniform sampler2D spread_map; // see penumbra_estimate.glsl
 
 // How much sample i counts, and whether the receiver sees it.
 vec2 look_up(Surface s, int i, float depth, float bias)

@@ -1,8 +1,8 @@
 // The plane of the surface under a pixel, and how far neighbours are from it. Needs P(depth_sigma).
 #include "view.glsl"
 #include "octahedral.glsl"
-layout(binding = 0) uniform sampler2D g_depth;
-layout(binding = 1) uniform sampler2D g_normal;
+layout(binding = UNIT_DEPTH) uniform sampler2D g_depth;
+layout(binding = UNIT_NORMAL) uniform sampler2D g_normal;
 
 struct Plane {
     vec3 normal;

@@ -72,20 +72,20 @@ void main()
     float threshold = unit_float(hash3(uvec3(gl_FragCoord.xy, uint(view.display.z))).x);
     if (alpha_is_cut(v_material, base.a, threshold))
         discard;
-    if (material_has(v_material, SURFACE)) {
-        vec4 t = material_sample(surface_map, v_material, SURFACE, v_uv);
+    if (material_has(v_material, SCENE_UNIT_SURFACE)) {
+        vec4 t = material_sample(surface_map, v_material, SCENE_UNIT_SURFACE, v_uv);
         metallic *= t.b;
         roughness *= t.g;
         f0 *= t.rgb;
         glossiness *= t.a;
     }
-    if (material_has(v_material, OCCLUSION))
+    if (material_has(v_material, SCENE_UNIT_OCCLUSION))
         occlusion = 1.0 + m.surface.z *
-            (material_sample(occlusion_map, v_material, OCCLUSION, v_uv).r - 1.0);
-    if (material_has(v_material, EMISSION))
-        emission *= material_sample(emission_map, v_material, EMISSION, v_uv).rgb;
-    if (material_has(v_material, NORMAL) && dot(v_tangent.xyz, v_tangent.xyz) > 0.0) {
-        vec3 t = material_sample(normal_map, v_material, NORMAL, v_uv).xyz * 2.0 - 1.0;
+            (material_sample(occlusion_map, v_material, SCENE_UNIT_OCCLUSION, v_uv).r - 1.0);
+    if (material_has(v_material, SCENE_UNIT_EMISSION))
+        emission *= material_sample(emission_map, v_material, SCENE_UNIT_EMISSION, v_uv).rgb;
+    if (material_has(v_material, SCENE_UNIT_NORMAL) && dot(v_tangent.xyz, v_tangent.xyz) > 0.0) {
+        vec3 t = material_sample(normal_map, v_material, SCENE_UNIT_NORMAL, v_uv).xyz * 2.0 - 1.0;
         t.xy *= m.surface.w;
         vec3 tangent = normalize(v_tangent.xyz - shading * dot(v_tangent.xyz, shading));
         vec3 bitangent = cross(shading, tangent) * v_tangent.w;
@@ -97,7 +97,7 @@ void main()
     vec4 base = m.base_color * v_color;
 #endif
     vec3 albedo = base.rgb;
-    if ((m.flags.y & SPECULAR_GLOSSINESS) != 0u) {
+    if ((m.flags.y & PSC_SPECULAR_GLOSSINESS) != 0u) {
         float strongest = max(f0.r, max(f0.g, f0.b));
         metallic = solve_metallic(brightness(albedo) , brightness(f0));
         vec3 from_diffuse = albedo * (1.0 - strongest) / (0.96 * max(1.0 - metallic, 1e-4));
@@ -106,7 +106,7 @@ void main()
         roughness = 1.0 - glossiness;
         specular = clamp(strongest / 0.08, 0.0, 1.0);
     }
-    if ((m.flags.y & UNLIT) != 0u) {
+    if ((m.flags.y & PSC_UNLIT) != 0u) {
         emission = albedo;
         albedo = vec3(0.0);
         specular = 0.0;

@@ -1,28 +1,29 @@
 // All geometry passes. FULL: every attribute; ALPHA: what an alpha test needs; GROUND: the receiver
 // under the bounds, made of four vertices without any buffer.
 #include "view.glsl"
+#include "attributes.def"
 
 layout(location = LOCATION_TO_CLIP) uniform mat4 to_clip; // world to clip space of the target
 
-layout(location = 0) in vec3 position;
+layout(location = ATTRIBUTE_POSITION) in vec3 position;
 #if defined(FULL) || defined(ALPHA)
-layout(location = 3) in vec4 uv;
-layout(location = 4) in vec4 color;
-layout(location = 11) in float material;
+layout(location = ATTRIBUTE_UV) in vec4 uv;
+layout(location = ATTRIBUTE_COLOR) in vec4 color;
+layout(location = ATTRIBUTE_MATERIAL) in float material;
 out vec4 v_uv;
 out vec4 v_color;
 flat out uint v_material;
 #endif
 #ifdef FULL
-layout(location = 1) in vec4 normal;
-layout(location = 2) in vec4 tangent;
+layout(location = ATTRIBUTE_NORMAL) in vec4 normal;
+layout(location = ATTRIBUTE_TANGENT) in vec4 tangent;
 out vec3 v_position; // relative to the eye: keeps derivatives exact far from the origin
 out vec3 v_normal;
 out vec4 v_tangent;
 #endif
-layout(location = 8) in vec4 row0;
-layout(location = 9) in vec4 row1;
-layout(location = 10) in vec4 row2;
+layout(location = ATTRIBUTE_ROW0) in vec4 row0;
+layout(location = ATTRIBUTE_ROW1) in vec4 row1;
+layout(location = ATTRIBUTE_ROW2) in vec4 row2;
 
 void main()
 {

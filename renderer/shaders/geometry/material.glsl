@@ -1,25 +1,11 @@
-// Materials and their textures; mirrors struct material_record in scene.c.
-struct Material {
-    vec4 base_color;
-    vec4 emissive;  // w: alpha cutoff
-    vec4 surface;   // metallic, roughness, occlusion strength, normal scale
-    vec4 specular;  // specular-glossiness: F0 factor, glossiness
-    uvec4 flags;    // alpha mode, flags, mask of textures, uv sets
-    vec4 transforms[10];
-};
-layout(std430, binding = 0) readonly buffer Materials {
-    Material materials[];
-};
+// Materials and their textures.
+#include "material.def"
 
-const uint ALPHA_MASK = 1u, ALPHA_BLEND = 2u;
-const uint DOUBLE_SIDED = 1u, UNLIT = 2u, SPECULAR_GLOSSINESS = 4u;
-const int BASE = 0, SURFACE = 1, NORMAL = 2, OCCLUSION = 3, EMISSION = 4;
-
-layout(binding = 0) uniform sampler2D base_map;
-layout(binding = 1) uniform sampler2D surface_map;
-layout(binding = 2) uniform sampler2D normal_map;
-layout(binding = 3) uniform sampler2D occlusion_map;
-layout(binding = 4) uniform sampler2D emission_map;
+layout(binding = SCENE_UNIT_BASE) uniform sampler2D base_map;
+layout(binding = SCENE_UNIT_SURFACE) uniform sampler2D surface_map;
+layout(binding = SCENE_UNIT_NORMAL) uniform sampler2D normal_map;
+layout(binding = SCENE_UNIT_OCCLUSION) uniform sampler2D occlusion_map;
+layout(binding = SCENE_UNIT_EMISSION) uniform sampler2D emission_map;
 
 bool material_has(uint material, int slot)
 {
@@ -49,8 +35,8 @@ vec4 material_sample(sampler2D map, uint material, int slot, vec4 uv)
 vec4 material_base(uint material, vec4 uv, vec4 color)
 {
     vec4 base = materials[material].base_color * color;
-    if (material_has(material, BASE))
-        base *= material_sample(base_map, material, BASE, uv);
+    if (material_has(material, SCENE_UNIT_BASE))
+        base *= material_sample(base_map, material, SCENE_UNIT_BASE, uv);
     return base;
 }
 
@@ -58,7 +44,7 @@ vec4 material_base(uint material, vec4 uv, vec4 color)
 bool alpha_is_cut(uint material, float alpha, float threshold)
 {
     uint mode = materials[material].flags.x;
-    if (mode == ALPHA_MASK)
+    if (mode == PSC_MASK)
         return alpha < materials[material].emissive.w;
-    return mode == ALPHA_BLEND && alpha <= threshold;
+    return mode == PSC_BLEND && alpha <= threshold;
 }

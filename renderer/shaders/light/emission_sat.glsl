@@ -1,5 +1,5 @@
 // Integral of emission over rectangles of the emitter, divided by its area (passes/light/emission_sat.h).
-layout(binding = 9) uniform sampler2D emission_sums;
+layout(binding = UNIT_EMISSION_SUMS) uniform sampler2D emission_sums;
 
 vec3 emission_below(vec2 corner)
 {

@@ -1,6 +1,8 @@
 // Occlusion bits of the emitter's points (passes/light/light_bits.h). LIGHT_BITS, an expression, is 64
 // or 256; patches that overlap set the same bits, so casters behind one another count once.
-layout(binding = 8) uniform usampler2DArray bits_below; // (step, 2 pattern + axis, 128 bits)
+#include "patches.def"
+// (step, 2 pattern + axis, 128 bits)
+layout(binding = UNIT_LIGHT_BITS) uniform usampler2DArray bits_below;
 #define BIT_LAYERS (LIGHT_BITS == 256 ? 2 : 1)
 const float BIT_STEPS = 512.0;
 

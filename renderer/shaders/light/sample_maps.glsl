@@ -1,9 +1,5 @@
 // Lookups in the depth maps of points of the emitter (passes/light/sample_maps.h).
-struct SampleMap {
-    vec4 at;     // xy emitter position, zw the same in [-1, 1]^2
-    vec4 window; // uv = l * xy + zw
-    vec4 layer;  // x layer, y weight, z side of the part of the emitter, in uv; w the method's own
-};
+#include "sample_map.def"
 
 // What of the receiver is the same for all samples.
 struct SampledReceiver {

@@ -6,7 +6,8 @@
 // node without a caster or beside the light ends there, and one whose depths barely differ, or that
 // is smaller than 1 / P(kernel) of the light as seen past it, is a single caster. PATCHES_APART: the
 // method has no rows P(fill) and P(gap), and leaves gaps between casters alone.
-layout(binding = 7) uniform sampler2DArray caster_maps; // hardware depth, nearest layer first
+#include "patches.def"
+layout(binding = UNIT_CASTERS) uniform sampler2DArray caster_maps; // hardware depth, nearest layer first
 #define MIN_MAX_LAYERED
 #include "min_max.glsl"
 #include "horizon.glsl"

@@ -7,13 +7,9 @@
 #else
 #define SERIES_SAMPLER sampler2DArray
 #endif
-layout(binding = 7) uniform SERIES_SAMPLER basis;
-layout(binding = 8) uniform SERIES_SAMPLER basis_weighted;
-layout(std140, binding = 3) uniform ConvolutionBlock {
-    vec4 weight[4];
-    float range, offset, low, scale;
-    float table_scale;
-} series;
+#include "convolution.def"
+layout(binding = UNIT_BASIS) uniform SERIES_SAMPLER basis;
+layout(binding = UNIT_BASIS_WEIGHTED) uniform SERIES_SAMPLER basis_weighted;
 
 #define LAYERS (int(P(terms) + 1u) / 2)
 

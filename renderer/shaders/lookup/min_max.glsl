@@ -2,7 +2,7 @@
 #ifdef MIN_MAX_LAYERED
 // Hardware depth of layers, nearest first, so that the first one bounds all: r min, g max, b mean.
 // The side is a power of two that may reach over the map's (passes/map/peel.h).
-layout(binding = 14) uniform sampler2DArray min_max_pyramid;
+layout(binding = UNIT_MIN_MAX) uniform sampler2DArray min_max_pyramid;
 
 vec2 min_max_at(ivec2 at, int level)
 {
@@ -15,7 +15,7 @@ vec2 min_max_size() // of the map, in texels of level 0
     return 0.5 * vec2(textureSize(caster_maps, 0).xy);
 }
 #else
-layout(binding = 14) uniform sampler2D min_max_pyramid; // r min, g max, z in m
+layout(binding = UNIT_MIN_MAX) uniform sampler2D min_max_pyramid; // r min, g max, z in m
 
 vec2 min_max_at(ivec2 at, int level)
 {

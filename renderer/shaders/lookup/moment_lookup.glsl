@@ -1,7 +1,7 @@
 // One filtered fetch from a blurred moment map (passes/map/moments.c) and what to compare it with.
 #include "depth_unit.glsl"
 #include "moments.glsl"
-layout(binding = 7) uniform sampler2D moment_map; // trilinear
+layout(binding = UNIT_SOURCE) uniform sampler2D moment_map; // trilinear
 
 struct MomentLookup {
     vec4 m;

@@ -1,12 +1,11 @@
 // Means of windows from a modular summed-area table (passes/map/sat.c).
-layout(binding = 8) uniform usampler2D sat; // texel (x, y): sum over [0, x) x [0, y), mod 2^32
-layout(std140, binding = 3) uniform SatBlock {
-    vec4 sat_info; // 1 / scale, side, widest window in texels
-};
+#include "sat.def"
+// Texel (x, y): sum over [0, x) x [0, y), mod 2^32.
+layout(binding = UNIT_SAT) uniform usampler2D sat;
 
 vec2 sat_texel() // m on the map plane
 {
-    return (light.rect.zw - light.rect.xy) / sat_info.y;
+    return (light.rect.zw - light.rect.xy) / sat_info.side;
 }
 
 uvec4 sat_at(int x, int y)
@@ -20,7 +19,7 @@ vec4 sat_mean_whole(ivec2 low, ivec2 high)
     uvec4 sum = sat_at(high.x, high.y) - sat_at(low.x, high.y) - sat_at(high.x, low.y) +
         sat_at(low.x, low.y);
     ivec2 size = high - low;
-    return vec4(sum) * (sat_info.x / float(size.x * size.y));
+    return vec4(sum) * (sat_info.inverse_scale / float(size.x * size.y));
 }
 
 // Mean over [low, high] in texels, 0 <= low < high <= side; texels that the border cuts count by the
@@ -28,7 +27,7 @@ vec4 sat_mean_whole(ivec2 low, ivec2 high)
 // and are taken relative to one corner while they are integers.
 vec4 sat_mean(vec2 low, vec2 high)
 {
-    int last = int(sat_info.y);
+    int last = int(sat_info.side);
     ivec2 a = ivec2(low), b = ivec2(high);
     vec2 fa = low - vec2(a), fb = high - vec2(b);
     int xs[4] = int[4](a.x, min(a.x + 1, last), b.x, min(b.x + 1, last));
@@ -47,5 +46,5 @@ vec4 sat_mean(vec2 low, vec2 high)
         sum += wy[j] * row;
     }
     vec2 size = high - low;
-    return sum * (sat_info.x / (size.x * size.y));
+    return sum * (sat_info.inverse_scale / (size.x * size.y));
 }

@@ -1,9 +1,6 @@
 // One direction of a separable binomial-like kernel; weights are the host's.
-layout(binding = 7) uniform sampler2D source;
-layout(std140, binding = 3) uniform BlurBlock {
-    vec4 step;       // xy: one texel along the direction, in texture coordinates; z: radius
-    vec4 weights[4]; // of distance 0 to 15
-} blur;
+#include "blur.def"
+layout(binding = UNIT_SOURCE) uniform sampler2D source;
 layout(location = 0) out vec4 result;
 
 void main()

@@ -1,12 +1,7 @@
 // Two terms of the caster part of the series, per texel of the depth map. WEIGHTED: times depth.
 #include "light.glsl"
-layout(binding = 7) uniform sampler2D source;
-layout(std140, binding = 3) uniform BasisBlock {
-    float range;
-    int first_term; // from 0; -1: depth itself
-    int terms;
-    float table_scale;
-} basis;
+#include "basis.def"
+layout(binding = UNIT_SOURCE) uniform sampler2D source;
 #ifdef TABLES
 layout(location = 0) out uvec4 value;
 #define STORED(v) uvec4(clamp(v, 0.0, 1.0) / basis.table_scale + 0.5)

@@ -9,7 +9,7 @@ flat in uint v_material;
 #endif
 
 #ifdef PEEL // only what lies behind the layer before
-layout(binding = 7) uniform sampler2D layer_before;
+layout(binding = UNIT_SOURCE) uniform sampler2D layer_before;
 #endif
 
 void main()

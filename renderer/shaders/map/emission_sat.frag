@@ -1,7 +1,7 @@
 // Corner sums of emission, ROWS first, then columns of the row sums.
 #include "light.glsl"
 #include "emitter_area.glsl"
-layout(binding = 7) uniform sampler2D rows;
+layout(binding = UNIT_SOURCE) uniform sampler2D rows;
 layout(location = 0) out vec4 sum;
 
 void main()

@@ -1,15 +1,13 @@
 // One level of one layer's pyramid: min, max and mean of hardware depth. Sides are powers of two;
 // beyond the map nothing is.
-layout(binding = 7) uniform sampler2DArray finer;
-layout(std140, binding = 3) uniform LevelBlock {
-    ivec4 source; // x: level, y: layer
-} from;
+#include "level.def"
+layout(binding = UNIT_SOURCE) uniform sampler2DArray finer;
 layout(location = 0) out vec4 range;
 
 vec3 load(ivec2 at)
 {
-    ivec2 size = textureSize(finer, from.source.x).xy;
-    vec4 v = texelFetch(finer, ivec3(min(at, size - 1), from.source.y), from.source.x);
+    ivec2 size = textureSize(finer, from.level.x).xy;
+    vec4 v = texelFetch(finer, ivec3(min(at, size - 1), from.level.y), from.level.x);
 #ifdef FROM_DEPTH
     return vec3(any(greaterThanEqual(at, size)) ? 1.0 : v.r);
 #else

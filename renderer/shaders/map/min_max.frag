@@ -1,10 +1,8 @@
 // One level of a min-max pyramid of linear depth. A level of odd side drops nothing: the last texel
 // of a row also takes the leftover column.
 #include "light.glsl"
-layout(binding = 7) uniform sampler2D source;
-layout(std140, binding = 3) uniform LevelBlock {
-    ivec4 level;
-} from;
+#include "level.def"
+layout(binding = UNIT_SOURCE) uniform sampler2D source;
 layout(location = 0) out vec2 range;
 
 #ifdef FROM_DEPTH

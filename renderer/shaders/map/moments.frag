@@ -3,10 +3,8 @@
 // four moments of depth in [-1, 1], PACKED as integers want them.
 #include "depth_unit.glsl"
 #include "moments.glsl"
-layout(binding = 7) uniform sampler2D source; // hardware depth
-layout(std140, binding = 3) uniform MomentBlock {
-    vec4 exponents; // xy; z: empty texels around the map
-} moment;
+#include "moments.def"
+layout(binding = UNIT_SOURCE) uniform sampler2D source; // hardware depth
 layout(location = 0) out vec4 result;
 
 float load(ivec2 at)

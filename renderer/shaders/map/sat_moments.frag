@@ -2,10 +2,8 @@
 // of the table, times the scale.
 #include "depth_unit.glsl"
 #include "moments.glsl"
-layout(binding = 7) uniform sampler2D source; // hardware depth
-layout(std140, binding = 3) uniform ScaleBlock {
-    vec4 scale; // x: integers per unit, y: map texels per table texel and axis
-} table;
+#include "sat_moments.def"
+layout(binding = UNIT_SOURCE) uniform sampler2D source; // hardware depth
 layout(location = 0) out uvec4 result;
 
 void main()

@@ -1,8 +1,9 @@
 // One work group sums one line of `source` and writes it as a column: run twice, that is a
 // summed-area table. Integer sums wrap, so their order does not matter.
+#include "sat_scan.def"
 layout(local_size_x = 256) in;
-layout(binding = 7) uniform usampler2D source;
-layout(FORMAT, binding = 0) writeonly uniform uimage2D target;
+layout(binding = UNIT_SOURCE) uniform usampler2D source;
+layout(FORMAT, binding = IMAGE_SUMS) writeonly uniform uimage2D target;
 shared uvec4 partial[256];
 
 void main()

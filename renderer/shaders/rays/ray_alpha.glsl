@@ -1,29 +1,15 @@
-// Triangles whose alpha decides: struct ray_alpha_triangle and the words of passes/rays/ray_scene.c. What
-// is computed is what renderer/trace/filter.c computes.
-struct AlphaTriangle {
-    vec2 uv[3];   // transform applied
-    float a[3];   // vertex alpha
-    uint material;
-};
-layout(std430, binding = 6) readonly buffer AlphaTriangles {
-    AlphaTriangle alpha_triangles[];
-};
-// Eight words per material, then texels, four to a word.
-layout(std430, binding = 7) readonly buffer AlphaWords {
-    uint alpha_words[];
-};
+// Triangles whose alpha decides. What is computed is what renderer/trace/filter.c computes.
+#include "ray_alpha.def"
 
-const uint ALPHA_NO_TEXELS = 0xffffffffu;
-const uint WRAP_CLAMP = 1u, WRAP_MIRROR = 2u;
-const uint ALPHA_BLEND = 1u, ALPHA_NEAREST = 2u;
+const uint NO_TEXELS = 0xffffffffu;
 
 uint ray_salt; // hash of the ray; set before it is traced
 
 int alpha_wrap(int i, int size, uint mode)
 {
-    if (mode == WRAP_CLAMP)
+    if (mode == PSC_CLAMP)
         return clamp(i, 0, size - 1);
-    int period = mode == WRAP_MIRROR ? 2 * size : size;
+    int period = mode == PSC_MIRROR ? 2 * size : size;
     i = i < 0 ? period - 1 - (-1 - i) % period : i % period;
     return i < size ? i : period - 1 - i;
 }
@@ -31,9 +17,9 @@ int alpha_wrap(int i, int size, uint mode)
 // Brings a coordinate near the image.
 float alpha_reduce(float t, uint mode)
 {
-    if (mode == WRAP_CLAMP)
+    if (mode == PSC_CLAMP)
         return clamp(t, -1.0, 2.0);
-    return mode == WRAP_MIRROR ? t - 2.0 * floor(0.5 * t) : t - floor(t);
+    return mode == PSC_MIRROR ? t - 2.0 * floor(0.5 * t) : t - floor(t);
 }
 
 float alpha_texel(uint first, ivec2 size, uvec2 wrap, ivec2 at)
@@ -45,9 +31,9 @@ float alpha_texel(uint first, ivec2 size, uvec2 wrap, ivec2 at)
 
 float alpha_sample(uint first, ivec2 size, uint flags, vec2 uv)
 {
-    uvec2 wrap = uvec2(flags >> 8u, flags >> 16u) & 255u;
+    uvec2 wrap = uvec2(flags >> WRAP_S_SHIFT, flags >> WRAP_T_SHIFT) & 255u;
     vec2 s = vec2(alpha_reduce(uv.x, wrap.x), alpha_reduce(uv.y, wrap.y)) * vec2(size);
-    if ((flags & ALPHA_NEAREST) != 0u)
+    if ((flags & FLAG_NEAREST) != 0u)
         return alpha_texel(first, size, wrap, ivec2(floor(s))) / 255.0;
     vec2 low = floor(s - 0.5), t = s - 0.5 - low;
     ivec2 i = ivec2(low);
@@ -62,16 +48,17 @@ bool ray_alpha_hit(uint record, vec2 uv)
 {
     AlphaTriangle t = alpha_triangles[record];
     vec3 weight = vec3(1.0 - uv.x - uv.y, uv);
-    uint m = 8u * t.material, first = alpha_words[m + 2u], flags = alpha_words[m + 5u];
-    float alpha = dot(weight, vec3(t.a[0], t.a[1], t.a[2])) * uintBitsToFloat(alpha_words[m]);
-    float threshold = uintBitsToFloat(alpha_words[m + 1u]);
-    if (first != ALPHA_NO_TEXELS) {
+    uint m = WORDS * t.material;
+    uint first = alpha_words[m + WORD_FIRST], flags = alpha_words[m + WORD_FLAGS];
+    float alpha = dot(weight, vec3(t.a[0], t.a[1], t.a[2])) * uintBitsToFloat(alpha_words[m + WORD_FACTOR]);
+    float threshold = uintBitsToFloat(alpha_words[m + WORD_CUTOFF]);
+    if (first != NO_TEXELS) {
         vec2 s = weight.x * t.uv[0] + weight.y * t.uv[1] + weight.z * t.uv[2];
-        ivec2 size = ivec2(alpha_words[m + 3u], alpha_words[m + 4u]);
+        ivec2 size = ivec2(alpha_words[m + WORD_WIDTH], alpha_words[m + WORD_HEIGHT]);
         alpha *= alpha_sample(first, size, flags, s);
     }
     // The same answer however often a ray meets the triangle; its mean is a share alpha.
-    if ((flags & ALPHA_BLEND) != 0u)
+    if ((flags & FLAG_BLEND) != 0u)
         threshold = (float(trace_hash(ray_salt + record * 0x9e3779b9u) >> 8u) + 0.5) / 16777216.0;
     return alpha >= threshold;
 }

@@ -2,29 +2,8 @@
 // pen_bvh_occluded over it. A triangle with alpha is asked through
 //     bool ray_alpha_hit(uint record, vec2 uv)
 // of the includer when ALPHA is defined.
-struct BvhNode {
-    vec3 low;
-    uint first;
-    vec3 high;
-    uint count; // 0: children are nodes first and first + 1; else triangles from `first`
-};
-struct BvhTriangle {
-    vec3 corner;
-    uint flags;
-    vec3 edge1;
-    uint instance;
-    vec3 edge2;
-    uint alpha; // number of its alpha record
-};
-layout(std430, binding = 0) readonly buffer BvhNodes {
-    BvhNode bvh_nodes[];
-};
-layout(std430, binding = 1) readonly buffer BvhTriangles {
-    BvhTriangle bvh_triangles[];
-};
+#include "bvh.def"
 
-const uint BVH_TWO_SIDED = 1u, BVH_ALPHA = 2u, BVH_LEAF = 4u; // triangles at most
-const int BVH_STACK = 32;
 const float BVH_MISS = 3e38;
 
 // Where the ray enters the node's box; BVH_MISS when it does not before `limit`.
@@ -44,15 +23,15 @@ bool bvh_hits(uint triangle, vec3 origin, vec3 direction, float limit)
     BvhTriangle t = bvh_triangles[triangle];
     vec3 p = cross(direction, t.edge2), s = origin - t.corner, q = cross(s, t.edge1);
     float determinant = dot(t.edge1, p); // positive when the ray meets the front
-    if (determinant == 0.0 || (determinant > 0.0 && (t.flags & BVH_TWO_SIDED) == 0u))
+    if (determinant == 0.0 || (determinant > 0.0 && (t.flags & PEN_BVH_TWO_SIDED) == 0u))
         return false;
     float u = dot(s, p) / determinant, v = dot(direction, q) / determinant;
     float at = dot(t.edge2, q) / determinant;
     if (!(u >= 0.0 && v >= 0.0 && u + v <= 1.0 && at > 0.0 && at < limit))
         return false;
 #ifdef ALPHA
-    if ((t.flags & BVH_ALPHA) != 0u)
-        return ray_alpha_hit(t.alpha, vec2(u, v));
+    if ((t.flags & PEN_BVH_ALPHA) != 0u)
+        return ray_alpha_hit(t.first_index, vec2(u, v));
 #endif
     return true;
 }
@@ -64,7 +43,7 @@ bool bvh_cut = false; // some walk was not finished: its answer means nothing
 // loops of an invocation when they have turned 65535 times together.
 bool bvh_occluded(vec3 origin, vec3 direction, float limit, uint nodes)
 {
-    uint stack[BVH_STACK], at = 0u;
+    uint stack[PEN_BVH_STACK], at = 0u;
     int waiting = 0;
     vec3 safe = mix(direction, vec3(1e-20), lessThanEqual(abs(direction), vec3(1e-20)));
     vec3 inverse = 1.0 / safe;
@@ -73,7 +52,7 @@ bool bvh_occluded(vec3 origin, vec3 direction, float limit, uint nodes)
     for (uint steps = 0u; steps < nodes; steps++) {
         uint first = bvh_nodes[at].first, count = bvh_nodes[at].count;
         bool inner = count == 0u;
-        for (uint i = 0u; i < min(count, BVH_LEAF); i++)
+        for (uint i = 0u; i < min(count, PEN_BVH_LEAF); i++)
             if (bvh_hits(first + i, origin, direction, limit))
                 return true;
         float left = BVH_MISS, right = BVH_MISS;
@@ -82,7 +61,7 @@ bool bvh_occluded(vec3 origin, vec3 direction, float limit, uint nodes)
             right = bvh_enter(first + 1u, origin, inverse, limit);
         }
         bool swapped = right < left;
-        if (left != BVH_MISS && right != BVH_MISS && waiting < BVH_STACK)
+        if (left != BVH_MISS && right != BVH_MISS && waiting < PEN_BVH_STACK)
             stack[waiting++] = swapped ? first : first + 1u;
         if (left != BVH_MISS || right != BVH_MISS) {
             at = swapped ? first + 1u : first;

@@ -1,6 +1,6 @@
-// A receiver and the light as it sees it; mirrors renderer/trace/packet.c. LIGHT_TYPE is one of enum
-// pen_trace_light_type.
-const int TRACE_RECT = 0, TRACE_DISK = 1, TRACE_SPHERE = 2, TRACE_SUN = 3, TRACE_POINT = 4;
+// A receiver and the light as it sees it, computed as in renderer/trace/packet.c. LIGHT_TYPE is one
+// of enum pen_trace_light_type.
+#include "lights.def"
 const float RAY_END = 0.9999; // just before the light, which may be a mesh itself
 
 struct RayReceiver {
@@ -47,14 +47,14 @@ bool load_receiver(ivec2 pixel, uvec4 net, out RayReceiver r)
     r.shift = ivec2(r.id & net.y, trace_hash(r.id ^ 0x68bc21ebu) & net.y);
     r.a = ray.a.xyz;
     r.b = ray.b.xyz;
-    r.base = LIGHT_TYPE == TRACE_SUN ? -ray.z.xyz : ray.origin.xyz - p;
-    r.front = LIGHT_TYPE == TRACE_SUN ? 1.0 : -dot(r.base, ray.z.xyz);
+    r.base = LIGHT_TYPE == PEN_TRACE_SUN ? -ray.z.xyz : ray.origin.xyz - p;
+    r.front = LIGHT_TYPE == PEN_TRACE_SUN ? 1.0 : -dot(r.base, ray.z.xyz);
     float away = length(r.base);
-    if (LIGHT_TYPE == TRACE_SPHERE || LIGHT_TYPE == TRACE_POINT)
+    if (LIGHT_TYPE == PEN_TRACE_SPHERE || LIGHT_TYPE == PEN_TRACE_POINT)
         r.front = away;
-    if (LIGHT_TYPE == TRACE_SPHERE)
+    if (LIGHT_TYPE == PEN_TRACE_SPHERE)
         face_receiver(-r.base / away, r.a, r.b);
-    bool outside = LIGHT_TYPE == TRACE_POINT && -dot(r.base, ray.z.xyz) / away < ray.origin.w;
+    bool outside = LIGHT_TYPE == PEN_TRACE_POINT && -dot(r.base, ray.z.xyz) / away < ray.origin.w;
     r.cos_base = dot(n, r.base);
     r.cos_a = dot(n, r.a);
     r.cos_b = dot(n, r.b);
@@ -62,7 +62,7 @@ bool load_receiver(ivec2 pixel, uvec4 net, out RayReceiver r)
         r.cos_base + abs(r.cos_a) + abs(r.cos_b) > 0.0;
     vec3 lift = receiver_lift(p) * n;
     r.origin = p + lift;
-    if (LIGHT_TYPE != TRACE_SUN)
+    if (LIGHT_TYPE != PEN_TRACE_SUN)
         r.base -= lift;
     return true;
 }
@@ -82,7 +82,7 @@ vec2 disk_point(vec2 s)
 vec2 light_point(ivec2 at)
 {
     vec2 s = vec2(at) * (1.0 / 2147483648.0);
-    return LIGHT_TYPE == TRACE_RECT || LIGHT_TYPE == TRACE_POINT ? s : disk_point(s);
+    return LIGHT_TYPE == PEN_TRACE_RECT || LIGHT_TYPE == PEN_TRACE_POINT ? s : disk_point(s);
 }
 
 // Above 0 when the receiver faces light point s.
@@ -101,6 +101,6 @@ bool is_visible(RayReceiver r, vec3 direction, uint salt)
 #ifdef ALPHA
     ray_salt = trace_hash(r.id ^ trace_hash(salt));
 #endif
-    float limit = LIGHT_TYPE == TRACE_SUN ? 1e30 : RAY_END;
+    float limit = LIGHT_TYPE == PEN_TRACE_SUN ? 1e30 : RAY_END;
     return !bvh_occluded(r.origin, direction, limit, ray.size.z);
 }

@@ -1,7 +1,8 @@
 // A few rays from every receiver: what they agree on, rows from `first_row`.
-layout(local_size_x = 8, local_size_y = 8) in;
+#include "rays.def"
+layout(local_size_x = RAY_TILE, local_size_y = RAY_TILE) in;
 #include "ray_trace.glsl"
-layout(r8ui, binding = 2) writeonly uniform uimage2D verdicts;
+layout(r8ui, binding = IMAGE_MARKS) writeonly uniform uimage2D verdicts;
 layout(location = LOCATION_FIRST_ROW) uniform uint first_row;
 
 void main()

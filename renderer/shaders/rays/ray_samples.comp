@@ -1,20 +1,14 @@
 // Some samples for some of the listed receivers; sums are kept between calls. COLOUR sums emission,
-// WEIGHTS weights by G; mirrors renderer/trace/visibility.c.
-layout(local_size_x = 64) in;
+// WEIGHTS weights by G; as renderer/trace/visibility.c does.
 #include "ray_trace.glsl"
-layout(binding = 5) uniform sampler2D emission_texture;
+#include "ray_samples.def"
+layout(local_size_x = RAY_GROUP) in;
+layout(binding = UNIT_EMISSION) uniform sampler2D emission_texture;
 
-struct RaySums {
-    uint count;            // visible samples
-    float pairs;           // (difference of V within a pair, times its mean weight)^2; -1: finished
-    float weight, visible; // sum w, sum w V
-    vec4 rgb;              // sum w e V
-};
-layout(std430, binding = 3) buffer RayState {
-    RaySums state[];
-};
-layout(location = LOCATION_RANGE) uniform uvec4 range; // first entry of the list, entries, first point, points
-layout(location = LOCATION_ENDS) uniform uint ends;   // 1: a receiver may stop after this, 2: it must
+// First entry of the list, entries, first point, points.
+layout(location = LOCATION_RANGE) uniform uvec4 range;
+// 1: a receiver may stop after this, 2: it must.
+layout(location = LOCATION_ENDS) uniform uint ends;
 
 void finish(ivec2 pixel, inout RaySums sums)
 {

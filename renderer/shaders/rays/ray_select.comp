@@ -1,8 +1,9 @@
 // Lists the receivers that get all samples and settles the others. EVERY: all of them are listed.
-layout(local_size_x = 8, local_size_y = 8) in;
+#include "rays.def"
+layout(local_size_x = RAY_TILE, local_size_y = RAY_TILE) in;
 #include "ray_job.glsl"
-layout(binding = 9) uniform usampler2D verdicts;
-layout(binding = 10) uniform usampler2D spread;
+layout(binding = UNIT_RAY_VERDICTS) uniform usampler2D verdicts;
+layout(binding = UNIT_RAY_SPREAD) uniform usampler2D spread;
 shared uint used, base;
 
 bool is_receiver(ivec2 pixel)

@@ -1,9 +1,10 @@
 // Marks what lies within DILATION receivers in x of a mixed verdict, or of lit beside umbra: a contact
 // or a silhouette whose penumbra is thinner than a receiver. ray_select.comp spreads it in y.
-layout(local_size_x = 8, local_size_y = 8) in;
+#include "rays.def"
+layout(local_size_x = RAY_TILE, local_size_y = RAY_TILE) in;
 #include "ray_job.glsl"
-layout(r8ui, binding = 2) writeonly uniform uimage2D spread;
-layout(binding = 9) uniform usampler2D verdicts;
+layout(r8ui, binding = IMAGE_MARKS) writeonly uniform uimage2D spread;
+layout(binding = UNIT_RAY_VERDICTS) uniform usampler2D verdicts;
 
 bool is_edge(uint a, uint b)
 {

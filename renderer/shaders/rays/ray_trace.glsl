@@ -1,4 +1,5 @@
 // All that a shader needs to shoot shadow rays.
+#include "rays.def"
 #include "ray_hash.glsl"
 #ifdef ALPHA
 #include "ray_alpha.glsl"

@@ -1,8 +1,8 @@
 // World position and geometric normal of every pixel, for work outside of OpenGL. Background: 0.
 #include "view.glsl"
 #include "octahedral.glsl"
-layout(binding = 0) uniform sampler2D g_depth;
-layout(binding = 1) uniform sampler2D g_normal;
+layout(binding = UNIT_DEPTH) uniform sampler2D g_depth;
+layout(binding = UNIT_NORMAL) uniform sampler2D g_normal;
 layout(location = 0) out vec4 position;
 layout(location = 1) out vec4 normal;
 

@@ -2,14 +2,8 @@
 // nearest and farthest depth; its image in light space bounds q and r_z of all of them.
 #include "surface.glsl"
 #include "min_max.glsl"
-layout(std140, binding = 3) uniform ClassifyBlock {
-    vec4 margin; // x: texels of the full map, y: pixels of the image
-    ivec4 tile;  // x: px, y: 1 when umbra is looked for, z: 1 when windows are not shrunk by
-                 // caster, w: 1 when faces of a cube stay undecided
-} classify;
+#include "classify.def"
 layout(location = 0) out vec4 tile_class; // class / 255, receivers / 255
-
-const float LIT = 0.0, UNDECIDED = 1.0, UMBRA = 2.0, EMPTY = 3.0;
 
 // A cube's face only owns receivers inside its pyramid, as in screen.frag.
 int owned_receivers(ivec2 first, ivec2 end)
@@ -64,7 +58,7 @@ float classify_tile(ivec2 first, ivec2 size, out int receivers)
             receivers += d == 0.0 ? 0 : 1;
         }
     if (high == 0.0)
-        return EMPTY;
+        return TILE_EMPTY;
     // Corners of the slab, half a pixel wider than the pixel centres are.
     vec2 ndc_low = pixel_to_ndc(first) - vec2(1.0, -1.0) * view.viewport.zw;
     vec2 ndc_high = pixel_to_ndc(end - 1) + vec2(1.0, -1.0) * view.viewport.zw;
@@ -91,15 +85,15 @@ float classify_tile(ivec2 first, ivec2 size, out int receivers)
         bool foreign = any(greaterThan(nearest_side, vec4(rounding))) || p_high.z < -rounding;
         if (foreign && classify.tile.w == 0) {
             receivers = 0;
-            return EMPTY;
+            return TILE_EMPTY;
         }
         if (classify.tile.w != 0 || any(greaterThan(farthest_side, vec4(-rounding)))) {
             receivers = owned_receivers(first, end);
-            return UNDECIDED;
+            return TILE_UNDECIDED;
         }
     }
     if (behind)
-        return UNDECIDED; // beside or behind the light: nothing to project
+        return TILE_UNDECIDED; // beside or behind the light: nothing to project
     vec2 texel = (light.rect.zw - light.rect.xy) / vec2(2 * textureSize(min_max_pyramid, 0));
     vec2 center = 0.5 * (q_low + q_high), spread = 0.5 * (q_high - q_low) + classify.margin.x * texel;
     float pixel = view.forward.w / (low * view.eye.w); // m, of the farthest receiver
@@ -138,14 +132,14 @@ float classify_tile(ivec2 first, ivec2 size, out int receivers)
             }
         }
     if (!blocked)
-        return all_face_light(first, end, p_low, p_high) ? LIT : UNDECIDED;
+        return all_face_light(first, end, p_low, p_high) ? TILE_LIT : TILE_UNDECIDED;
     // In umbra every texel of every window blocks: the windows must not reach over the map's border,
     // where nothing is, and lie wholly in front of the nearest receiver.
     vec2 window = reach + spread;
     bool inside = all(greaterThan(center - window, light.rect.xy)) &&
         all(lessThan(center + window, light.rect.zw));
     bool dark = min_max_window(center, window).y < near_z * 0.98 - slack;
-    return inside && dark && classify.tile.y != 0 ? UMBRA : UNDECIDED;
+    return inside && dark && classify.tile.y != 0 ? TILE_UMBRA : TILE_UNDECIDED;
 }
 
 void main()

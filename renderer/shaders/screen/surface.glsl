@@ -3,8 +3,8 @@
 #include "octahedral.glsl"
 #include "light.glsl"
 
-layout(binding = 0) uniform sampler2D g_depth;
-layout(binding = 1) uniform sampler2D g_normal;
+layout(binding = UNIT_DEPTH) uniform sampler2D g_depth;
+layout(binding = UNIT_NORMAL) uniform sampler2D g_normal;
 
 struct Surface {
     vec3 p;       // m, light space

@@ -45,11 +45,12 @@ void main()
     v_material = uint(material);
 #endif
 #ifdef FULL
-    // Normals go with the cofactor matrix, which also serves singular and mirroring matrices.
-    v_normal = cross(row1.xyz, row2.xyz) * normal.x + cross(row2.xyz, row0.xyz) * normal.y +
-        cross(row0.xyz, row1.xyz) * normal.z;
-    if (dot(row0.xyz, cross(row1.xyz, row2.xyz)) < 0.0)
-        v_normal = -v_normal;
+    // Normals go with the cofactor matrix, which also serves singular and mirroring matrices. Unit
+    // length before they are interpolated, as if the vertices had been transformed in the file.
+    v_normal = vec3(dot(cross(row1.xyz, row2.xyz), normal.xyz),
+        dot(cross(row2.xyz, row0.xyz), normal.xyz), dot(cross(row0.xyz, row1.xyz), normal.xyz));
+    v_normal *= (dot(row0.xyz, cross(row1.xyz, row2.xyz)) < 0.0 ? -1.0 : 1.0) *
+        inversesqrt(max(dot(v_normal, v_normal), 1e-36));
     v_tangent = vec4(dot(row0.xyz, tangent.xyz), dot(row1.xyz, tangent.xyz),
         dot(row2.xyz, tangent.xyz), tangent.w);
 #endif

@@ -32,12 +32,13 @@ static float encode_srgb(float c)
     return pen_srgb_encodef(c > 0 ? fminf(c, 1) : 0); /* NaN: 0 */
 }
 
-void worker_measure_display(
-    const float radiance[3], float exposure_ev, uint32_t tone_map, float display[3])
+/* Display values in [0, 1] of scene-linear RGB that already has its exposure: tone curve and sRGB (IEC
+ * 61966-2-1), as renderer/shaders/frame/display.glsl. */
+static void to_display(const float radiance[3], uint32_t tone_map, float display[3])
 {
-    float c[3], scale = exp2f(exposure_ev);
+    float c[3];
     for (int i = 0; i < 3; i++)
-        c[i] = fmaxf(radiance[i] * scale, 0);
+        c[i] = fmaxf(radiance[i], 0);
     float luminance = 0.2126f * c[0] + 0.7152f * c[1] + 0.0722f * c[2];
     for (int i = 0; i < 3; i++) {
         if (tone_map == PEN_TONE_REINHARD)
@@ -71,8 +72,7 @@ static struct planes_header *make_planes(
     float *to = (float *)(header + 1), *display = to + pixels;
     for (size_t i = 0; i < pixels; i++) {
         to[i] = visibility[4 * i + 3];
-        worker_measure_display(
-            &beauty[4 * i], request->exposure_ev, request->tone_map, &display[3 * i]);
+        to_display(&beauty[4 * i], request->tone_map, &display[3 * i]);
     }
     return header;
 }

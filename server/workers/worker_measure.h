@@ -9,8 +9,3 @@ void worker_measure_output(struct pen_output *output);
 /* Fills the answer's descriptors as item->measure says, and result.comparison when there is a
  * reference. Errors: PEN_INTERNAL, in the item's result. */
 bool worker_measure(struct worker_item *item, struct channel_fds *fds);
-
-/* Display values in [0, 1] of scene-linear RGB: exposure, tone curve, sRGB (IEC
- * 61966-2-1), as renderer/shaders/frame/display.glsl. */
-void worker_measure_display(
-    const float radiance[3], float exposure_ev, uint32_t tone_map, float display[3]);

@@ -239,6 +239,8 @@ static void write_components(
 void pen_json_row(struct pen_json *json, const struct pen_param *row, const void *object)
 {
     double values[4];
+    if (pen_param_is_auto(row, object))
+        return;
     for (uint32_t i = 0; i < row->count; i++)
         values[i] = pen_param_load(row, object, i);
     write_components(json, row->name, row, values);
@@ -246,7 +248,8 @@ void pen_json_row(struct pen_json *json, const struct pen_param *row, const void
 
 void pen_json_row_default(struct pen_json *json, const char *key, const struct pen_param *row)
 {
-    write_components(json, key, row, row->def_v);
+    if (!row->automatic)
+        write_components(json, key, row, row->def_v);
 }
 
 char *pen_json_finish(struct pen_json *json, size_t *bytes)

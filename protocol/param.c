@@ -50,7 +50,13 @@ void pen_params_default(struct pen_param_table table, void *object)
 {
     for (uint32_t r = 0; r < table.count; r++)
         for (uint32_t i = 0; i < table.rows[r].count; i++)
-            store(&table.rows[r], object, i, table.rows[r].def_v[i]);
+            store(&table.rows[r], object, i,
+                table.rows[r].automatic ? PEN_AUTO : table.rows[r].def_v[i]);
+}
+
+bool pen_param_is_auto(const struct pen_param *row, const void *object)
+{
+    return row->automatic && pen_param_load(row, object, 0) == PEN_AUTO;
 }
 
 const struct pen_param *pen_param_find(struct pen_param_table table, const char *name)

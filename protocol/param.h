@@ -35,7 +35,12 @@ struct pen_param {
     uint8_t specialise; /* 1: a constant of the shader, one program per value: for what chooses its
                            code, not for counts and sizes */
     uint8_t exclusive_min; /* 1: min itself is not allowed */
+    uint8_t automatic; /* 1: left out, it holds PEN_AUTO until something that suits is chosen; def
+                          is what such a choice starts from */
 };
+
+/* What every component of an automatic row (of floats) holds while nobody has given a value. */
+#define PEN_AUTO (-3.402823466e38f)
 
 #define PEN_PARAM_TYPE_OF(field)                                                                   \
     _Generic((field), float : PEN_PARAM_FLOAT, float * : PEN_PARAM_FLOAT, int32_t : PEN_PARAM_INT, \
@@ -64,6 +69,9 @@ struct pen_param_table {
 
 /* Writes every row's default into `object`. */
 void pen_params_default(struct pen_param_table table, void *object);
+
+/* True when `row` is automatic and still waits for a value. */
+bool pen_param_is_auto(const struct pen_param *row, const void *object);
 
 /* The row called `name`, or NULL. */
 const struct pen_param *pen_param_find(struct pen_param_table table, const char *name);

@@ -175,7 +175,8 @@ static bool check_rows(struct pen_param_table table, const void *object, uint32_
 {
     for (uint32_t r = 0; r < table.count; r++) {
         const struct pen_param *row = &table.rows[r];
-        if (row->applies && light_bit && !(row->applies & light_bit))
+        if ((row->applies && light_bit && !(row->applies & light_bit)) ||
+            pen_param_is_auto(row, object))
             continue;
         double values[4];
         uint32_t scratch[128]; /* only the range check is wanted, not the store */

@@ -1,6 +1,8 @@
 #include "renderer/frame/frame.h"
 #include "renderer/frame/layers.h"
 #include "renderer/frame/output.h"
+#include "renderer/frame/sky.h"
+#include "renderer/light/meter.h"
 #include "renderer/passes/draw/gbuffer.h"
 #include "renderer/passes/draw/screen.h"
 #include "renderer/passes/map/shadow_cache.h"
@@ -56,7 +58,8 @@ static void upload_view(struct frame *f, uint32_t number)
     b.viewport[0] = (float)r->width, b.viewport[1] = (float)r->height;
     b.viewport[2] = 1 / b.viewport[0], b.viewport[3] = 1 / b.viewport[1];
     memcpy(b.ambient, r->ambient, 12);
-    memcpy(b.background, r->background, 12);
+    if (r->background[0] != PEN_AUTO)
+        memcpy(b.background, r->background, 12);
     memcpy(b.ground_albedo, r->ground_albedo, 12);
     float center[3], radius = scene_radius(f->job->scene);
     scene_center(f->job->scene, center);
@@ -190,6 +193,7 @@ static void scale3(float out[4], const float v[3], float factor, float w)
 static void make_shade_block(const struct frame *f, struct shade_block *b)
 {
     memset(b, 0, sizeof *b);
+    sky_choose(b, f->job->request, &f->view);
     for (uint32_t i = 0; i < f->light_count; i++) {
         const struct light *l = &f->lights[i];
         const struct light_face *face = &l->faces[0];
@@ -216,6 +220,7 @@ static bool shade(struct frame *f, struct pen_error *error)
         {UNIT_ALBEDO, t->gbuffer.albedo.texture.name, GL_SAMPLE_NEAREST},
         {UNIT_SURFACE, t->gbuffer.surface.texture.name, GL_SAMPLE_NEAREST},
         {UNIT_SOURCE, t->vis.texture.name, GL_SAMPLE_NEAREST},
+        {UNIT_SKY_OPEN, t->sky_open[1].texture.name, GL_SAMPLE_NEAREST},
         {UNIT_EMITTED, t->gbuffer.emission.texture.name, GL_SAMPLE_NEAREST}};
     bool rect = false, round = false, punctual = false;
     for (uint32_t i = 0; i < f->light_count; i++) {
@@ -224,8 +229,9 @@ static bool shade(struct frame *f, struct pen_error *error)
         round |= type == PEN_LIGHT_DISK || type == PEN_LIGHT_SPHERE;
         punctual |= type >= PEN_LIGHT_SUN;
     }
-    char defines[192];
-    snprintf(defines, sizeof defines, "#define LIGHTS %u\n%s%s%s%s%s%s", f->light_count,
+    char defines[224];
+    snprintf(defines, sizeof defines, "#define LIGHTS %u\n%s%s%s%s%s%s%s", f->light_count,
+        job->request->sky.on ? "#define SKY\n" : "",
         job->scene->has_gloss ? "#define GLOSSY\n" : "", direct ? "#define RESOLVE\n" : "",
         emission ? "#define EMIT\n" : "", rect ? "#define HAS_RECT\n" : "",
         round ? "#define HAS_ROUND\n" : "", punctual ? "#define HAS_PUNCTUAL\n" : "");
@@ -235,7 +241,7 @@ static bool shade(struct frame *f, struct pen_error *error)
             .defines = defines,
             .stage = PEN_STAGE_SHADE,
             .textures = textures,
-            .texture_count = emission ? 6 : 5,
+            .texture_count = emission ? 7 : 6,
             .framebuffer = direct ? t->color.framebuffer : t->beauty.framebuffer,
             .width = job->request->width,
             .height = job->request->height,
@@ -276,7 +282,20 @@ static bool render_jittered(struct frame *f, uint32_t number, struct pen_error *
     return pass_gbuffer(f->job->ctx, f->job->scene, &f->view, r->ground.on,
                &f->job->targets->gbuffer, &f->triangles, error) &&
            (!frame_output_needs_shadows(r) || record_visibility(f, error)) &&
+           (!beauty || !r->sky.on || sky_occlusion(f->job, error)) &&
            (!beauty || shade(f, error)) && (!visibility || add_visibility(f, error));
+}
+
+/* What faces the lights squarely comes out just below white, with the sky's share on top. The key
+ * light is made to measure: its level is 1. */
+static void choose_exposure(struct frame *f, bool own_light)
+{
+    struct pen_request *r = f->job->request;
+    float level = own_light ? 1 : light_meter(f->lights, f->light_count, f->job->scene);
+    if (r->exposure_ev == PEN_AUTO)
+        r->exposure_ev = glm_clamp(log2f(0.72f / level), -24, 24);
+    if (r->sky_level == PEN_AUTO)
+        r->sky_level = fminf(level, 1e6f);
 }
 
 bool frame_render(const struct frame_job *job, struct pen_frame *frame, struct pen_result *result,
@@ -290,7 +309,9 @@ bool frame_render(const struct frame_job *job, struct pen_frame *frame, struct p
     shadow_cache_begin_frame(job->ctx->shadows);
     if (!view_resolve(&f.view, &r->camera, job->scene, r->width, r->height, error))
         return false;
-    f.light_count = lights_resolve(f.lights, r, job->scene, result);
+    bool own_light = !r->lights_given && !job->scene->blob.light_count;
+    f.light_count = lights_resolve(f.lights, r, job->scene, &f.view, result);
+    choose_exposure(&f, own_light);
     uint32_t faces = 1;
     for (uint32_t i = 0; i < f.light_count; i++)
         faces += f.lights[i].face_count;

@@ -10,6 +10,7 @@ struct frame_targets {
     struct gl_target beauty, visibility; /* RGBA32F */
     struct gl_target classes;            /* RG16F: times proved lit, in umbra */
     struct gl_target variance;           /* R32F: of the squared standard errors */
+    struct gl_target sky_open[2]; /* R8, half size: how much of the sky is seen; raw, smooth */
 };
 /* Makes a sum fit the request's picture and start at 0. */
 void frame_fit_sum(struct gl_target *target, GLenum format, const struct pen_request *request);

@@ -373,25 +373,34 @@ static void make_light(
     fit_face(&light->faces[0], light, scene);
 }
 
-/* One rectangle above and beside the bounds, of a power that lights their centre with about
- * 3 W m^-2: a white surface then comes out just below display white. */
-static void auto_light(struct pen_light *light, const struct scene *scene)
+/* The key light of a photograph: in front of the subject as the camera sees it, to the left and
+ * above, so that form is modelled and the shadow falls to the right where it is seen. Its power
+ * lights the centre with PI W m^-2: a white surface that faces it has radiance 1. */
+static void auto_light(struct pen_light *light, const struct scene *scene, const struct view *view)
 {
-    float center[3], radius = scene_radius(scene);
+    float center[3], back[3], right[3], radius = scene_radius(scene);
     pen_light_default(light, PEN_LIGHT_RECT);
     scene_center(scene, center);
-    static const float direction[3] = {0.62f, 0.75f, -0.23f};
-    float distance = 2.4f * radius;
+    /* On the horizon; looking straight down, what is up in the picture is away from the camera. */
+    for (int i = 0; i < 3; i++)
+        back[i] = -view->forward[i] - 0.5f * fabsf(view->forward[1]) * view->up[i];
+    back[1] = 0;
+    glm_vec3_normalize(back);
+    glm_vec3_cross((float[]){0, 1, 0}, back, right);
+    const float azimuth = glm_rad(52), elevation = glm_rad(46), distance = 6 * radius;
+    float across = cosf(elevation);
     for (int i = 0; i < 3; i++) {
+        float direction = across * (cosf(azimuth) * back[i] - sinf(azimuth) * right[i]) +
+                          (i == 1 ? sinf(elevation) : 0);
         light->target[i] = center[i];
-        light->position[i] = center[i] + distance * direction[i];
+        light->position[i] = center[i] + distance * direction;
     }
-    light->width = light->height = 0.6f * radius;
-    light->power_w = 3.2f * GLM_PIf * distance * distance;
+    light->width = light->height = 1.2f * radius;
+    light->power_w = GLM_PIf * GLM_PIf * distance * distance;
 }
 
 uint32_t lights_resolve(struct light lights[PEN_MAX_LIGHTS], struct pen_request *request,
-    const struct scene *scene, struct pen_result *result)
+    const struct scene *scene, const struct view *view, struct pen_result *result)
 {
     if (!request->lights_given) {
         uint32_t n = scene->blob.light_count;
@@ -403,7 +412,7 @@ uint32_t lights_resolve(struct light lights[PEN_MAX_LIGHTS], struct pen_request 
         for (uint32_t i = 0; i < n; i++)
             request->lights[i] = scene->blob.lights[i].light;
         if (!n)
-            auto_light(&request->lights[n++], scene);
+            auto_light(&request->lights[n++], scene, view);
         request->light_count = n;
         request->lights_given = 1;
     }

@@ -18,10 +18,10 @@ struct light {
     float origin[3], x[3], y[3], z[3];
 };
 
-/* Lights of the request, else of the scene, else one that suits the bounds; writes what it chose
- * back to *request. Returns the number of lights. */
+/* Lights of the request, else of the scene, else one that suits the content and the view; writes
+ * what it chose back to *request. Returns the number of lights. */
 uint32_t lights_resolve(struct light lights[PEN_MAX_LIGHTS], struct pen_request *request,
-    const struct scene *scene, struct pen_result *result);
+    const struct scene *scene, const struct view *view, struct pen_result *result);
 
 /* Matrix from light space to the clip space of the face's map (0 <= z <= w, near first), seen from
  * the light point `sample` (x, y on the emitter) with window `rect`. */

@@ -208,6 +208,7 @@ static void make_groups(struct scene *s)
     gl.CreateBuffers(1, &s->commands);
 }
 
+static void bound_instances(struct scene *s);
 static void find_content(struct scene *s);
 
 static struct scene *upload(struct scene *s, struct pen_error *error)
@@ -224,7 +225,9 @@ static struct scene *upload(struct scene *s, struct pen_error *error)
     s->depth_array = make_array(s, false);
     s->full_array = make_array(s, true);
     make_groups(s);
+    bound_instances(s);
     find_content(s);
+    outline_make(&s->outline, &s->blob, (const float(*)[3])s->content);
     if (gl.GetError() != GL_NO_ERROR) {
         pen_fail(error, PEN_INTERNAL, "", "The GPU has no memory left for this scene.");
         scene_destroy(s);
@@ -278,6 +281,7 @@ void scene_destroy(struct scene *s)
         gl.DeleteSamplers((GLsizei)s->blob.texture_count, s->samplers);
     free(s->images);
     free(s->samplers);
+    free(s->instance_bounds);
     free(s->order);
     free(s->groups);
     free(s->command_room);
@@ -308,18 +312,46 @@ void scene_center(const struct scene *s, float center[3])
         center[i] = scene_is_empty(s) ? 0 : 0.5f * (s->content[0][i] + s->content[1][i]);
 }
 
-void scene_instance_bounds(const struct scene *s, uint32_t instance, float min[3], float max[3])
+/* Vertices transformed for tight bounds, per scene: a few milliseconds' worth. */
+#define BOUND_BUDGET (8u << 20)
+
+static void grow(float bounds[2][3], const float m[12], const float p[3])
 {
-    const float *m = s->blob.instances[instance].world;
-    const struct psc_primitive *p = &s->blob.primitives[s->blob.instances[instance].primitive];
-    for (int row = 0; row < 3; row++) {
-        min[row] = max[row] = m[4 * row + 3];
-        for (int k = 0; k < 3; k++) {
-            float a = m[4 * row + k] * p->bounds_min[k], b = m[4 * row + k] * p->bounds_max[k];
-            min[row] += fminf(a, b);
-            max[row] += fmaxf(a, b);
+    for (int r = 0; r < 3; r++) {
+        float w = m[4 * r] * p[0] + m[4 * r + 1] * p[1] + m[4 * r + 2] * p[2] + m[4 * r + 3];
+        bounds[0][r] = fminf(bounds[0][r], w);
+        bounds[1][r] = fmaxf(bounds[1][r], w);
+    }
+}
+
+static void bound_instances(struct scene *s)
+{
+    uint64_t left = BOUND_BUDGET;
+    s->instance_bounds = pen_alloc_zero(s->blob.instance_count, sizeof *s->instance_bounds);
+    for (uint32_t i = 0; i < s->blob.instance_count; i++) {
+        const struct psc_instance *instance = &s->blob.instances[i];
+        const struct psc_primitive *p = &s->blob.primitives[instance->primitive];
+        float(*bounds)[3] = s->instance_bounds[i];
+        for (int k = 0; k < 3; k++)
+            bounds[0][k] = INFINITY, bounds[1][k] = -INFINITY;
+        if (p->vertex_count <= left) {
+            left -= p->vertex_count;
+            for (uint32_t v = 0; v < p->vertex_count; v++)
+                grow(bounds, instance->world, s->blob.positions[p->first_vertex + v]);
+        } else {
+            for (int c = 0; c < 8; c++)
+                grow(bounds, instance->world,
+                    (float[3]){c & 1 ? p->bounds_max[0] : p->bounds_min[0],
+                        c & 2 ? p->bounds_max[1] : p->bounds_min[1],
+                        c & 4 ? p->bounds_max[2] : p->bounds_min[2]});
         }
     }
+}
+
+void scene_instance_bounds(const struct scene *s, uint32_t instance, float min[3], float max[3])
+{
+    memcpy(min, s->instance_bounds[instance][0], 12);
+    memcpy(max, s->instance_bounds[instance][1], 12);
 }
 
 static void find_content(struct scene *s)

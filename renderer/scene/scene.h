@@ -2,6 +2,7 @@
 #pragma once
 #include "renderer/blob/pscene.h"
 #include "renderer/scene/cull.h"
+#include "renderer/scene/outline.h"
 #include "renderer/gl/program.h"
 #include "renderer/gl/texture.h"
 
@@ -30,7 +31,9 @@ struct scene {
     struct scene_group *groups;
     uint32_t group_count;
     struct cull_command *command_room;
-    float content[2][3]; /* world bounds without a flat floor that everything stands on */
+    float (*instance_bounds)[2][3]; /* world */
+    float content[2][3];    /* world bounds without a flat floor that everything stands on */
+    struct outline outline; /* of the content */
     bool has_emission, has_unlit;
     bool has_gloss; /* some roughness is below 0.5 */
     uint64_t bytes;
@@ -53,7 +56,8 @@ bool scene_is_empty(const struct scene *scene);
  * may be any size. */
 float scene_radius(const struct scene *scene);
 void scene_center(const struct scene *scene, float center[3]);
-/* World bounds of one instance: of its primitive's box, transformed. */
+/* World bounds of one instance: tight, but for scenes of so many vertices that its primitive's
+ * transformed box has to do. */
 void scene_instance_bounds(
     const struct scene *scene, uint32_t instance, float min[3], float max[3]);
 

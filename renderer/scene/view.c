@@ -1,5 +1,7 @@
 #include "renderer/scene/view.h"
+#include "protocol/memory.h"
 #include <cglm/cglm.h>
+#include <stdlib.h>
 #include <string.h>
 
 static void make_matrices(struct view *v, float jitter_x, float jitter_y)
@@ -18,42 +20,95 @@ static void make_matrices(struct view *v, float jitter_x, float jitter_y)
     glm_mat4_inv_precise(v->world_to_clip, v->clip_to_world);
 }
 
-/* The least distance from the centre at which all corners of the bounds are in the picture: each
- * corner asks for its own, by similar triangles. */
-static float framing_distance(const struct scene *scene, const float center[3],
-    const float direction[3], float fov_y_rad, float aspect)
+/* Share of the picture's half that the subject may fill: the rest is air around it. */
+#define FILL 0.9f
+
+#define TURNS 48 /* azimuths that an orbit is framed for */
+
+/* The content's extremes relative to its centre: x to the right, y up, z towards the eye. */
+struct framing {
+    float (*points)[3];
+    uint32_t count;
+};
+
+/* The least distance at which all points are inside a picture of half width t at distance 1, however
+ * the view is moved along `axis`: |x - move| <= t (distance - z) holds for both sides with the
+ * smallest distance where the largest z + x / t and the largest z - x / t are equal. */
+static float framing_distance(const struct framing *f, int axis, float t)
 {
-    float right[3], up[3], world_up[3] = {0, 1, 0}, least = 0;
-    glm_vec3_cross(world_up, (float *)direction, right);
-    glm_vec3_normalize(right);
-    glm_vec3_cross((float *)direction, right, up);
-    float tan_y = tanf(0.5f * fov_y_rad), tan_x = tan_y * aspect;
-    for (int i = 0; i < 8; i++) {
-        float d[3];
-        for (int k = 0; k < 3; k++)
-            d[k] = scene->content[i >> k & 1][k] - center[k];
-        float toward = glm_vec3_dot(d, (float *)direction);
-        least = fmaxf(least, toward + fabsf(glm_vec3_dot(d, right)) / tan_x);
-        least = fmaxf(least, toward + fabsf(glm_vec3_dot(d, up)) / tan_y);
+    float right = -INFINITY, left = -INFINITY;
+    for (uint32_t i = 0; i < f->count; i++) {
+        right = fmaxf(right, f->points[i][2] + f->points[i][axis] / t);
+        left = fmaxf(left, f->points[i][2] - f->points[i][axis] / t);
     }
-    return least;
+    return 0.5f * (right + left);
 }
 
-static void frame_bounds(struct pen_camera *c, const struct scene *scene, float aspect)
+/* The move that leaves the same margin on both sides at that distance: the sum of the two outermost
+ * tangents falls with it. */
+static float framing_move(const struct framing *f, int axis, float distance)
 {
-    float center[3], distance = c->distance;
+    float low = INFINITY, high = -INFINITY;
+    for (uint32_t i = 0; i < f->count; i++) {
+        low = fminf(low, f->points[i][axis]);
+        high = fmaxf(high, f->points[i][axis]);
+    }
+    for (int step = 0; step < 30; step++) {
+        float move = 0.5f * (low + high), most = -INFINITY, least = INFINITY;
+        for (uint32_t i = 0; i < f->count; i++) {
+            float tangent = (f->points[i][axis] - move) / (distance - f->points[i][2]);
+            most = fmaxf(most, tangent);
+            least = fminf(least, tangent);
+        }
+        if (most + least > 0)
+            low = move;
+        else
+            high = move;
+    }
+    return 0.5f * (low + high);
+}
+
+/* `all_round`: for any azimuth, so that an orbit neither jumps nor breathes. */
+static struct framing collect(
+    const struct scene *scene, const float center[3], const float axes[3][3], bool all_round)
+{
+    const uint32_t turns = all_round ? TURNS : 1;
+    struct framing f = {.count = scene->outline.extreme_count * turns};
+    f.points = pen_alloc_zero(f.count, sizeof *f.points);
+    for (uint32_t n = 0; n < f.count; n++) {
+        const float *from = scene->outline.extremes[n / turns];
+        float angle = 2 * GLM_PIf * (float)(n % turns) / (float)turns;
+        float x = from[0] - center[0], z = from[2] - center[2];
+        float p[3] = {x * cosf(angle) + z * sinf(angle), from[1] - center[1],
+            z * cosf(angle) - x * sinf(angle)};
+        for (int k = 0; k < 3; k++)
+            f.points[n][k] = p[0] * axes[k][0] + p[1] * axes[k][1] + p[2] * axes[k][2];
+    }
+    return f;
+}
+
+static void frame_content(struct pen_camera *c, const struct scene *scene, float aspect)
+{
+    float center[3], distance = c->distance, move[2] = {0, 0};
     scene_center(scene, center);
     float azimuth = glm_rad(c->azimuth_deg), elevation = glm_rad(c->elevation_deg);
-    float direction[3] = {
-        sinf(azimuth) * cosf(elevation), sinf(elevation), cosf(azimuth) * cosf(elevation)};
-    if (distance <= 0 && !scene_is_empty(scene))
-        distance =
-            1.06f * framing_distance(scene, center, direction, glm_rad(c->fov_y_deg), aspect);
-    if (distance <= 0)
+    float tan_y = FILL * tanf(0.5f * glm_rad(c->fov_y_deg));
+    float axes[3][3] = {{cosf(azimuth), 0, -sinf(azimuth)},
+        {-sinf(azimuth) * sinf(elevation), cosf(elevation), -cosf(azimuth) * sinf(elevation)},
+        {sinf(azimuth) * cosf(elevation), sinf(elevation), cosf(azimuth) * cosf(elevation)}};
+    if (distance <= 0 && scene->outline.extreme_count) {
+        struct framing f =
+            collect(scene, center, (const float(*)[3])axes, c->mode == PEN_CAMERA_ORBIT);
+        distance = fmaxf(framing_distance(&f, 0, tan_y * aspect), framing_distance(&f, 1, tan_y));
+        for (int k = 0; k < 2; k++)
+            move[k] = framing_move(&f, k, distance);
+        free(f.points);
+    }
+    if (!(distance > 0))
         distance = 3 * scene_radius(scene);
     for (int i = 0; i < 3; i++) {
-        c->target[i] = center[i];
-        c->eye[i] = center[i] + distance * direction[i];
+        c->target[i] = center[i] + move[0] * axes[0][i] + move[1] * axes[1][i];
+        c->eye[i] = c->target[i] + distance * axes[2][i];
     }
     c->up[0] = 0, c->up[1] = 1, c->up[2] = 0;
 }
@@ -75,7 +130,7 @@ bool view_resolve(struct view *v, struct pen_camera *c, const struct scene *scen
         memcpy(c->up, from->up, sizeof c->up);
         c->fov_y_deg = from->fov_y_deg;
     } else if (c->mode == PEN_CAMERA_AUTO || c->mode == PEN_CAMERA_ORBIT) {
-        frame_bounds(c, scene, v->aspect);
+        frame_content(c, scene, v->aspect);
     }
     c->mode = PEN_CAMERA_LOOK_AT;
     memcpy(v->eye, c->eye, sizeof v->eye);

@@ -90,7 +90,7 @@ static void check(const uint8_t *plane, const struct emitter *e)
     char settings[768];
     struct shot shot;
     snprintf(settings, sizeof settings,
-        "technique=none&ambient=0,0,0&light.radiance=1&width=48&height=48&ground="
+        "technique=none&sky=off&exposure_ev=0&light.radiance=1&width=48&height=48&ground="
         "off"
         "&camera.eye=0,1,0&camera.target=0,0,0&camera.up=0,0,-1&camera.fov_y_deg=120&%s",
         e->settings);

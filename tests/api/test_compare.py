@@ -8,9 +8,9 @@ import subprocess
 import threading
 import time
 import unittest
-import zlib
 
 import harness
+from pictures import read_png
 from harness import Daemon, grid_scene
 
 VIEW = {"width": 96, "height": 72, "ground": True,
@@ -29,36 +29,6 @@ def caster_scene():
     document["nodes"].append({"mesh": 0, "scale": [0.01, 0.01, 0.01], "translation": [0, -0.005, 0]})
     document["scenes"][0]["nodes"] = [0, 1]
     return harness.glb(document, data[28 + size:])
-
-
-def read_png(data):
-    """Width, height and RGB rows of an 8-bit PNG without interlace."""
-    assert data[:8] == b"\x89PNG\r\n\x1a\n"
-    at, packed = 8, b""
-    while at < len(data):
-        size, = struct.unpack(">I", data[at:at + 4])
-        kind, body = data[at + 4:at + 8], data[at + 8:at + 8 + size]
-        if kind == b"IHDR":
-            width, height, depth, colour = struct.unpack(">IIBB", body[:10])
-            assert depth == 8 and colour in (0, 2, 6)
-        elif kind == b"IDAT":
-            packed += body
-        at += size + 12
-    n = {0: 1, 2: 3, 6: 4}[colour]
-    raw, rows, before = zlib.decompress(packed), [], bytearray(width * n)
-    for y in range(height):
-        mode, line = raw[y * (width * n + 1)], bytearray(
-            raw[y * (width * n + 1) + 1:(y + 1) * (width * n + 1)])
-        for i in range(width * n):
-            left = line[i - n] if i >= n else 0
-            up, corner = before[i], before[i - n] if i >= n else 0
-            p = left + up - corner
-            paeth = min((abs(p - left), 0, left), (abs(p - up), 1, up),
-                        (abs(p - corner), 2, corner))[2]
-            line[i] = (line[i] + (0, left, up, (left + up) // 2, paeth)[mode]) & 255
-        rows.append([tuple(line[i:i + n]) for i in range(0, width * n, n)])
-        before = line
-    return width, height, rows
 
 
 class Compare(unittest.TestCase):

@@ -13,7 +13,12 @@ static void check_repeats(struct pen_renderer *r, const uint8_t *id)
         CHECK(fixture_render(r, &request, &result) == first);
         CHECK(result.shadow_inputs_reused);
     }
-    /* Only the camera moves: nothing of the light's is rebuilt, and no time is spent on it. */
+    /* Only the camera moves: nothing of the light's is rebuilt, and no time is spent on it. Lights
+     * that are left to us would move with it. */
+    memcpy(request.lights, result.completed.lights, sizeof request.lights);
+    request.light_count = result.completed.light_count;
+    request.lights_given = 1;
+    CHECK(fixture_render(r, &request, &result) && result.shadow_inputs_reused);
     request.camera.mode = PEN_CAMERA_ORBIT;
     request.camera.azimuth_deg += 20;
     CHECK(fixture_render(r, &request, &result) != first);

@@ -42,7 +42,8 @@ static void test_defaults(void)
     CHECK(params().search_taps == 16 && params().offset == -2 && params().mode == 1);
     CHECK(params().bias == 0.02f && params().tint[1] == 0.5f && params().rotate.on == 1);
     /* Values that equal the defaults change nothing, -0 is 0, and order does not matter. */
-    CHECK(parse(" {\"exposure_ev\":-0.0,\"technique\":{\"params\":{\"mode\":\"quadtree\"}},"
+    CHECK(parse(" {\"sky_intensity\":1.0,\"time_s\":-0.0,\"technique\":{\"params\":{\"mode\":"
+                "\"quadtree\"}},"
                 "\"output\":{},\"camera\":{},\"width\":8e2}\r\n"));
     CHECK(!memcmp(&expected, &request, sizeof request));
 }

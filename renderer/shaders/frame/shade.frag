@@ -6,6 +6,7 @@
 #include "irradiance.glsl"
 #include "display.glsl"
 #include "shade.def"
+#include "sky.glsl"
 
 layout(binding = UNIT_DEPTH) uniform sampler2D g_depth;
 layout(binding = UNIT_NORMAL) uniform sampler2D g_normal;
@@ -15,6 +16,10 @@ layout(binding = UNIT_SURFACE) uniform sampler2D g_surface;
 layout(binding = UNIT_EMITTED) uniform sampler2D g_emission;
 #endif
 layout(binding = UNIT_SOURCE) uniform sampler2DArray visibility_maps;
+
+#ifdef SKY
+layout(binding = UNIT_SKY_OPEN) uniform sampler2D sky_open; // half size
+#endif
 
 layout(location = 0) out vec4 color;
 
@@ -135,6 +140,37 @@ vec3 reflected(Material m, ShadeLight s, vec3 p, vec3 n, vec3 v)
 #endif
 }
 
+#ifdef SKY
+// How much of the sky the pixel sees: of the four half-size texels around it, those at its depth.
+float open_to_sky(ivec2 pixel, float depth)
+{
+    ivec2 last = textureSize(sky_open, 0) - 1, base = (pixel - 1) >> 1, size = ivec2(view.viewport.xy);
+    float sum = 0.0, weight = 0.0;
+    for (int i = 0; i < 4; i++) {
+        ivec2 q = clamp(base + ivec2(i & 1, i >> 1), ivec2(0), last);
+        float there = texelFetch(g_depth, min(2 * q + 1, size - 1), 0).r;
+        float w = exp2(-64.0 * abs(there - depth) / depth) + 1e-4;
+        sum += w * texelFetch(sky_open, q, 0).r;
+        weight += w;
+    }
+    return sum / weight;
+}
+
+vec3 sky_reflected(Material m, vec3 n, vec3 v, float open)
+{
+    float nv = clamp(dot(n, v), 1e-3, 1.0);
+    // Light that bounces between bright surfaces fills their corners (Jimenez et al. 2016, 4).
+    vec3 a = 2.0404 * m.diffuse - 0.3324, b = -4.7951 * m.diffuse + 0.6417;
+    vec3 c = 2.7552 * m.diffuse + 0.6903;
+    vec3 seen = max(vec3(open), ((open * a + b) * open + c) * open);
+    // A narrow lobe is hidden less gradually than a hemisphere (Lagarde and de Rousiers 2014).
+    float hidden = clamp(pow(nv + open, exp2(-16.0 * sqrt(m.alpha) - 1.0)) - 1.0 + open, 0.0, 1.0);
+    return m.diffuse * sky_diffuse(n) * seen +
+        sky_reflectance(m.f0, sqrt(m.alpha), nv) * sky_specular(reflect(-v, n), m.alpha) *
+        hidden;
+}
+#endif
+
 void main()
 {
     ivec2 pixel = ivec2(gl_FragCoord.xy);
@@ -151,6 +187,10 @@ void main()
     m.f0 = mix(vec3(0.08 * surface.a), albedo.rgb, surface.g);
     m.alpha = max(surface.r * surface.r, 0.002);
     vec3 sum = view.ambient.rgb * (m.diffuse + m.f0) * surface.b;
+#ifdef SKY
+    if (hit)
+        sum += surface.b * sky_reflected(m, n, v, open_to_sky(pixel, depth));
+#endif
 #ifdef EMIT
     sum += texelFetch(g_emission, pixel, 0).rgb;
 #endif
@@ -159,12 +199,16 @@ void main()
         if (hit && t != vec3(0.0))
             sum += t * shade.lights[i].radiance.rgb * reflected(m, shade.lights[i], p, n, v);
     }
+    vec3 background = view.background.rgb;
+#ifdef SKY
+    background += sky_backdrop(-v.y);
+#endif
     if (albedo.a == 0.0) { // the ground fades into the background, so that it has no edge
         float d = distance(p.xz, view.ground.xz) / view.ground.w;
-        sum = mix(sum, view.background.rgb, smoothstep(0.35, 0.95, d));
+        sum = mix(sum, background, smoothstep(0.15, 0.6, d));
     }
     if (!hit)
-        sum = view.background.rgb;
+        sum = background;
 #ifdef RESOLVE
     color = vec4(display_encode(sum), 1.0);
 #else

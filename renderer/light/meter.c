@@ -1,0 +1,69 @@
+#include "renderer/light/meter.h"
+#include <cglm/cglm.h>
+#include <stdlib.h>
+
+static float luminance(const float c[3])
+{
+    return 0.2126f * c[0] + 0.7152f * c[1] + 0.0722f * c[2];
+}
+
+/* Irradiance of one light on a surface at p. An emitter with an extent counts as a point of the
+ * same flux, kept from growing without bound near itself: a meter needs no more. */
+static float irradiance(const struct light *light, const float p[3], const float n[3])
+{
+    const struct pen_light *s = light->source;
+    float to[3], value = luminance(light->radiance), area = 0;
+    if (s->type == PEN_LIGHT_SUN)
+        return value * fabsf(glm_vec3_dot((float *)n, (float *)light->z));
+    glm_vec3_sub((float *)light->origin, (float *)p, to);
+    float d2 = glm_vec3_norm2(to), d = sqrtf(fmaxf(d2, 1e-20f));
+    float emitted = -glm_vec3_dot(to, (float *)light->z) / d; /* cosine on the emitter's side */
+    switch (s->type) {
+    case PEN_LIGHT_RECT:
+        area = s->width * s->height;
+        value *= fmaxf(emitted, 0);
+        break;
+    case PEN_LIGHT_DISK:
+        area = GLM_PIf * s->radius * s->radius;
+        value *= fmaxf(emitted, 0);
+        break;
+    case PEN_LIGHT_SPHERE:
+        area = GLM_PIf * s->radius * s->radius;
+        break;
+    case PEN_LIGHT_SPOT:
+        value *= emitted > cosf(glm_rad(s->outer_cone_deg));
+        break;
+    default:
+        break;
+    }
+    if (area > 0)
+        value *= area;
+    /* Surfaces are seen from both sides: the sign of a normal says little in many files. */
+    return value * fabsf(glm_vec3_dot((float *)n, to)) / (d * fmaxf(d2 + area / GLM_PIf, 1e-20f));
+}
+
+static int ascending(const void *a, const void *b)
+{
+    float x = *(const float *)a, y = *(const float *)b;
+    return (x > y) - (x < y);
+}
+
+float light_meter(const struct light *lights, uint32_t count, const struct scene *scene)
+{
+    const struct outline *o = &scene->outline;
+    float found[OUTLINE_SAMPLES], most = 0;
+    for (uint32_t i = 0; i < o->sample_count; i++) {
+        found[i] = 0;
+        for (uint32_t k = 0; k < count; k++)
+            found[i] += irradiance(&lights[k], o->samples[i].point, o->samples[i].normal);
+        most = fmaxf(most, found[i]);
+    }
+    if (!(most > 0) || !isfinite(most))
+        return 1;
+    qsort(found, o->sample_count, sizeof *found, ascending);
+    uint32_t dark = 0; /* not reached: outside a cone, behind an emitter */
+    while (found[dark] < 1e-3f * most)
+        dark++;
+    uint32_t lit = o->sample_count - dark;
+    return 4.0f / 3 * found[dark + (lit - 1) * 4 / 5] / GLM_PIf;
+}

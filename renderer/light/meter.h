@@ -1,0 +1,8 @@
+/* An incident-light meter: how bright what the lights reach is, before any shadow. */
+#pragma once
+#include "renderer/light/light.h"
+
+/* Radiance, W m^-2 sr^-1, of a white diffuse surface where the lights reach the content best: a
+ * third above what four fifths of all that they reach stay below. Independent of the camera, so that exposure is steady
+ * along a sequence. 1 without any light that reaches anything. */
+float light_meter(const struct light *lights, uint32_t count, const struct scene *scene);

@@ -1,0 +1,116 @@
+#include "renderer/scene/outline.h"
+#include <math.h>
+#include <string.h>
+
+/* Vertices per primitive beyond which only some are looked at; the error is that of one skipped
+ * vertex, which at these counts is far below a pixel. */
+#define MOST_VERTICES 200000u
+#define MOST_TRIANGLES 100000u
+
+static void place(const struct psc_instance *instance, const float p[3], float world[3])
+{
+    const float *m = instance->world;
+    for (int r = 0; r < 3; r++)
+        world[r] = m[4 * r] * p[0] + m[4 * r + 1] * p[1] + m[4 * r + 2] * p[2] + m[4 * r + 3];
+}
+
+static bool is_inside(const float p[3], const float (*content)[3])
+{
+    for (int k = 0; k < 3; k++) {
+        float slack = 1e-3f * (content[1][k] - content[0][k]) + 1e-6f * fabsf(content[1][k]);
+        if (p[k] < content[0][k] - slack || p[k] > content[1][k] + slack)
+            return false;
+    }
+    return true;
+}
+
+/* Directions on a spherical Fibonacci lattice (Swinbank and Purser 2006). */
+static void direction(uint32_t i, float d[3])
+{
+    float z = 1 - (2 * (float)i + 1) / OUTLINE_DIRECTIONS, r = sqrtf(1 - z * z);
+    float turn = 2.39996323f * (float)i;
+    d[0] = r * cosf(turn), d[1] = z, d[2] = r * sinf(turn);
+}
+
+static void find_extremes(struct outline *o, const struct psc_scene *s, const float (*content)[3])
+{
+    float directions[OUTLINE_DIRECTIONS][3], far[OUTLINE_DIRECTIONS];
+    bool any = false;
+    for (uint32_t i = 0; i < OUTLINE_DIRECTIONS; i++) {
+        direction(i, directions[i]);
+        far[i] = -INFINITY;
+    }
+    uint32_t step = s->vertex_count / MOST_VERTICES + 1;
+    for (uint32_t n = 0; n < s->instance_count; n++) {
+        const struct psc_primitive *p = &s->primitives[s->instances[n].primitive];
+        for (uint32_t v = 0; v < p->vertex_count; v += step) {
+            float at[3];
+            place(&s->instances[n], s->positions[p->first_vertex + v], at);
+            if (!is_inside(at, content))
+                continue;
+            any = true;
+            for (uint32_t i = 0; i < OUTLINE_DIRECTIONS; i++) {
+                const float *d = directions[i];
+                float along = at[0] * d[0] + at[1] * d[1] + at[2] * d[2];
+                if (along > far[i]) {
+                    far[i] = along;
+                    memcpy(o->extremes[i], at, sizeof at);
+                }
+            }
+        }
+    }
+    o->extreme_count = any ? OUTLINE_DIRECTIONS : 0;
+}
+
+static float area_normal(const struct psc_scene *s, const struct psc_instance *instance,
+    uint32_t first_index, float center[3], float normal[3])
+{
+    float corner[3][3], a[3], b[3];
+    for (int k = 0; k < 3; k++)
+        place(instance, s->positions[s->indices[first_index + k]], corner[k]);
+    for (int k = 0; k < 3; k++) {
+        a[k] = corner[1][k] - corner[0][k], b[k] = corner[2][k] - corner[0][k];
+        center[k] = (corner[0][k] + corner[1][k] + corner[2][k]) / 3;
+    }
+    for (int k = 0; k < 3; k++)
+        normal[k] = a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3];
+    float twice = sqrtf(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]);
+    for (int k = 0; k < 3; k++)
+        normal[k] /= fmaxf(twice, 1e-30f);
+    return 0.5f * twice;
+}
+
+/* Walks over (some of) the triangles inside. With `samples`, takes one whenever another `stride` of
+ * area has gone by; returns the area. */
+static double walk(struct outline *o, const struct psc_scene *s, const float (*content)[3],
+    bool take, double stride)
+{
+    uint64_t step = s->header->triangles / MOST_TRIANGLES + 1, at = 0;
+    double area = 0, next = 0.5 * stride;
+    for (uint32_t n = 0; n < s->instance_count; n++) {
+        const struct psc_primitive *p = &s->primitives[s->instances[n].primitive];
+        for (uint32_t i = 0; i + 2 < p->index_count; i += 3) {
+            float center[3], normal[3];
+            if (at++ % step)
+                continue;
+            float one = area_normal(s, &s->instances[n], p->first_index + i, center, normal);
+            if (!is_inside(center, content))
+                continue;
+            area += one;
+            for (; take && next < area && o->sample_count < OUTLINE_SAMPLES; next += stride) {
+                memcpy(o->samples[o->sample_count].point, center, sizeof center);
+                memcpy(o->samples[o->sample_count++].normal, normal, sizeof normal);
+            }
+        }
+    }
+    return area;
+}
+
+void outline_make(struct outline *o, const struct psc_scene *scene, const float (*content)[3])
+{
+    memset(o, 0, sizeof *o);
+    find_extremes(o, scene, content);
+    double area = walk(o, scene, content, false, 0);
+    if (area > 0)
+        walk(o, scene, content, true, area / OUTLINE_SAMPLES);
+}

@@ -1,0 +1,93 @@
+"""Pictures as tests see them: decoded PNG, and glTF files made of a few lines."""
+import struct
+import zlib
+
+import harness
+
+
+def read_png(data):
+    """Width, height and RGB rows of an 8-bit PNG without interlace."""
+    assert data[:8] == b"\x89PNG\r\n\x1a\n"
+    at, packed = 8, b""
+    while at < len(data):
+        size, = struct.unpack(">I", data[at:at + 4])
+        kind, body = data[at + 4:at + 8], data[at + 8:at + 8 + size]
+        if kind == b"IHDR":
+            width, height, depth, colour = struct.unpack(">IIBB", body[:10])
+            assert depth == 8 and colour in (0, 2, 6)
+        elif kind == b"IDAT":
+            packed += body
+        at += size + 12
+    n = {0: 1, 2: 3, 6: 4}[colour]
+    raw, rows, before = zlib.decompress(packed), [], bytearray(width * n)
+    for y in range(height):
+        mode, line = raw[y * (width * n + 1)], bytearray(
+            raw[y * (width * n + 1) + 1:(y + 1) * (width * n + 1)])
+        for i in range(width * n):
+            left = line[i - n] if i >= n else 0
+            up, corner = before[i], before[i - n] if i >= n else 0
+            p = left + up - corner
+            paeth = min((abs(p - left), 0, left), (abs(p - up), 1, up),
+                        (abs(p - corner), 2, corner))[2]
+            line[i] = (line[i] + (0, left, up, (left + up) // 2, paeth)[mode]) & 255
+        rows.append([tuple(line[i:i + n]) for i in range(0, width * n, n)])
+        before = line
+    return width, height, rows
+
+
+def rgb(answer):
+    """Pixels of a PNG answer, row after row, as RGB triples."""
+    return [pixel[:3] for row in read_png(answer.body)[2] for pixel in row]
+
+
+def off_by_more_than(a, b, most):
+    """How many pixels of two pictures of one size differ by more than this in some channel."""
+    assert len(a) == len(b)
+    return sum(max(abs(p - q) for p, q in zip(x, y)) > most for x, y in zip(a, b))
+
+
+def box(size=(1, 1, 1), center=(0, 0, 0)):
+    """Corners, normals and indices of a box whose faces share no vertex."""
+    points, normals, indices = [], [], []
+    for axis in range(3):
+        for side in (1, -1):
+            normal = [side * (k == axis) for k in range(3)]
+            first = len(points)
+            for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1)):
+                corner = [0, 0, 0]
+                corner[axis], corner[(axis + 1) % 3], corner[(axis + 2) % 3] = side, a, side * b
+                points.append([center[k] + 0.5 * size[k] * corner[k] for k in range(3)])
+                normals.append(normal)
+            indices += [first, first + 1, first + 2, first, first + 2, first + 3]
+    return points, normals, indices
+
+
+def mesh_scene(points, normals, indices, color=(1, 1, 1, 1), node=None, material=None, **more):
+    """A .glb of one mesh under one node; `more` goes into the document, lists at the end of those
+    that are there. All nodes are roots."""
+    vertex = b"".join(struct.pack("<3f", *p) for p in points)
+    normal = b"".join(struct.pack("<3f", *n) for n in normals)
+    index = struct.pack("<%dI" % len(indices), *indices)
+    low, high = ([pick(axis) for axis in zip(*points)] for pick in (min, max))
+    document = {
+        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0, **(node or {})}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0, "NORMAL": 1}, "indices": 2,
+                                    "material": 0}]}],
+        "materials": [{"pbrMetallicRoughness": {
+            "baseColorFactor": list(color), "metallicFactor": 0, "roughnessFactor": 1},
+            **(material or {})}],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": len(points), "type": "VEC3",
+             "min": low, "max": high},
+            {"bufferView": 1, "componentType": 5126, "count": len(normals), "type": "VEC3"},
+            {"bufferView": 2, "componentType": 5125, "count": len(indices), "type": "SCALAR"}],
+        "bufferViews": [
+            {"buffer": 0, "byteOffset": 0, "byteLength": len(vertex)},
+            {"buffer": 0, "byteOffset": len(vertex), "byteLength": len(normal)},
+            {"buffer": 0, "byteOffset": len(vertex) + len(normal), "byteLength": len(index)}],
+        "buffers": [{"byteLength": len(vertex) + len(normal) + len(index)}]}
+    for key, value in more.items():
+        document[key] = document.get(key, []) + value if isinstance(value, list) else value
+    document["scenes"][0]["nodes"] = list(range(len(document["nodes"])))
+    return harness.glb(document, vertex + normal + index)

@@ -1,0 +1,178 @@
+"""What a file looks like when nothing but the file is given: light, exposure, framing, normals."""
+import math
+import random
+import unittest
+
+import harness
+from harness import Daemon
+from pictures import box, mesh_scene, off_by_more_than, rgb
+
+SIZE = {"width": 160, "height": 120}
+
+
+def multiply(m, v):
+    return [sum(m[r][c] * v[c] for c in range(3)) for r in range(3)]
+
+
+def determinant(m):
+    return sum(m[0][i] * (m[1][(i + 1) % 3] * m[2][(i + 2) % 3] -
+                          m[1][(i + 2) % 3] * m[2][(i + 1) % 3]) for i in range(3))
+
+
+def inverse_transpose(m):
+    d = determinant(m)
+    return [[(m[(r + 1) % 3][(c + 1) % 3] * m[(r + 2) % 3][(c + 2) % 3] -
+              m[(r + 1) % 3][(c + 2) % 3] * m[(r + 2) % 3][(c + 1) % 3]) / d
+             for c in range(3)] for r in range(3)]
+
+
+def unit(v):
+    length = math.sqrt(sum(x * x for x in v))
+    return [x / length for x in v]
+
+
+def wedge():
+    """A shape without any symmetry, normals that lean away from its facets', corners that floats hold
+    exactly."""
+    points, _, indices = box((1, 1.5, 0.75))
+    points = [[x + 0.25 * y, y - 0.5 * x, z + 0.125 * y] for x, y, z in points]
+    normals = []
+    for first in range(0, len(points), 4):
+        a, b, c = points[first:first + 3]
+        u, v = ([q - p for p, q in zip(s, t)] for s, t in ((a, b), (b, c)))
+        facet = unit([u[(k + 1) % 3] * v[(k + 2) % 3] - u[(k + 2) % 3] * v[(k + 1) % 3]
+                      for k in range(3)])
+        normals += [unit([0.8 * n + 0.2 * p for n, p in zip(facet, unit(point))])
+                    for point in points[first:first + 4]]
+    return points, normals, indices
+
+
+class FirstSight(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.d = Daemon()
+
+    @classmethod
+    def tearDownClass(cls):
+        assert cls.d.stop() == 0
+
+    def picture(self, scene, **request):
+        answer = self.d.render(scene, {**SIZE, **request}, timeout=300)
+        self.assertEqual(answer.status, 200, answer.body[:300])
+        return rgb(answer)
+
+    def test_node_transform_is_the_baked_one(self):
+        """Rotation, shear, uneven scale, mirrors. Every number is a multiple of 1/64, so that both files
+        have the same vertices to the last bit."""
+        points, normals, indices = wedge()
+        rng = random.Random(7)
+        request = {**SIZE, "width": 96, "height": 72, "technique": {"name": "raytraced"}}
+        mirrors = 0
+        for n in range(50):
+            while True:
+                m = [[rng.randint(-96, 96) / 64 for _ in range(3)] for _ in range(3)]
+                if abs(determinant(m)) > 0.2:
+                    break
+            move = [rng.randint(-64, 64) / 64 for _ in range(3)]
+            turned = inverse_transpose(m)
+            mirrored = determinant(m) < 0
+            mirrors += mirrored
+            baked = mesh_scene(
+                [[a + b for a, b in zip(multiply(m, p), move)] for p in points],
+                [unit(multiply(turned, v)) for v in normals],
+                [i for k in range(0, len(indices), 3)
+                 for i in (indices[k:k + 3][::-1] if mirrored else indices[k:k + 3])])
+            columns = [m[r][c] if r < 3 else 0 for c in range(3) for r in range(4)] + move + [1]
+            placed = mesh_scene(points, normals, indices, node={"matrix": columns})
+            a, b = (rgb(self.d.render(self.d.upload(file), request)) for file in (placed, baked))
+            self.assertEqual(off_by_more_than(a, b, 8), 0, "transform %d: %s" % (n, m))
+        self.assertGreater(mirrors, 10)
+
+    def test_white_box_from_all_sides(self):
+        scene = self.d.upload(mesh_scene(*box()))
+        for n in range(12):
+            camera = {"camera": {"orbit": {"azimuth_deg": 30 * n + 5}}}
+            beauty = self.picture(scene, **camera)
+            faces, normals = {}, self.picture(scene, **camera, output={"layer": "normal"})
+            for color, normal in zip(beauty, normals):
+                faces.setdefault(normal, []).append(sum(color) / 3)
+            # The ground's normal is that of the top, and it is seen from all sides: it is told by depth.
+            means = [sum(v) / len(v) for k, v in faces.items()
+                     if len(v) > 100 and k not in ((128, 128, 128), (128, 255, 127), (128, 255, 128))]
+            self.assertGreaterEqual(len(means), 1, n)
+            self.assertGreater(max(means), 180, "azimuth %d: %s" % (n, means))
+            self.assertGreater(min(means), 60, "azimuth %d: %s" % (n, means))
+            ground = self.picture(scene, **camera, output={"layer": "visibility"})
+            dark = sum(1 for v, k in zip(ground, normals) if k in ((128, 255, 127), (128, 255, 128))
+                       and v[0] < 64)
+            self.assertGreater(dark, 0.01 * len(ground), "no shadow on the ground, azimuth %d" % n)
+
+    def test_subject_fills_the_frame(self):
+        for size in ((1, 1, 1), (0.2, 3, 0.2), (40, 10, 20)):
+            scene = self.d.upload(mesh_scene(*box(size)))
+            position = self.picture(scene, ground=False, output={"layer": "normal"})
+            rows = [y for y in range(SIZE["height"])
+                    if any(position[y * SIZE["width"] + x] != (128, 128, 128)
+                           for x in range(SIZE["width"]))]
+            columns = [x for x in range(SIZE["width"])
+                       if any(position[y * SIZE["width"] + x] != (128, 128, 128)
+                              for y in range(SIZE["height"]))]
+            share = max(len(rows) / SIZE["height"], len(columns) / SIZE["width"])
+            self.assertGreater(share, 0.8, size)
+            self.assertLess(share, 0.98, size)
+            self.assertLess(abs(rows[0] + rows[-1] + 1 - SIZE["height"]), 6, size)
+            self.assertLess(abs(columns[0] + columns[-1] + 1 - SIZE["width"]), 6, size)
+
+    def lit_mean(self, light, node):
+        """Mean of the pixels of a grey box (albedo 0.5) that the file's own light reaches."""
+        file = mesh_scene(*box(), color=(0.5, 0.5, 0.5, 1),
+                          nodes=[{"extensions": {"KHR_lights_punctual": {"light": 0}}, **node}],
+                          extensionsUsed=["KHR_lights_punctual"],
+                          extensions={"KHR_lights_punctual": {"lights": [light]}})
+        scene = self.d.upload(file)
+        lit = self.picture(scene, output={"layer": "visibility"}, ground=False)
+        none = self.picture(scene, output={"layer": "normal"}, ground=False)
+        beauty = self.picture(scene, ground=False)
+        reached = [sum(c) / 3 for c, v, n in zip(beauty, lit, none)
+                   if v[0] > 128 and n != (128, 128, 128)]
+        self.assertGreater(len(reached), 100)
+        answer = self.d.render(scene, {**SIZE, "ground": False}, Accept="application/json").json()
+        self.assertIsInstance(answer["request"]["exposure_ev"], float)
+        return sum(reached) / len(reached)
+
+    def test_exposure_suits_the_files_own_lights(self):
+        turned = {"rotation": [-0.5, 0.2, 0.1, 0.836]}  # down and from the side
+        for light, node in (
+                ({"type": "directional", "intensity": 3}, turned),
+                ({"type": "directional", "intensity": 100000}, turned),
+                ({"type": "point", "intensity": 5}, {"translation": [1, 2, 1.5]}),
+                ({"type": "point", "intensity": 80}, {"translation": [1, 2, 1.5]}),
+                ({"type": "spot", "intensity": 80, "spot": {"outerConeAngle": 0.9}},
+                 {"translation": [0.5, 2.5, 0.5], "rotation": [-0.68, 0.1, 0.1, 0.72]})):
+            mean = self.lit_mean(light, node)
+            self.assertGreater(mean, 90, light)
+            self.assertLess(mean, 200, light)
+
+    def test_exposure_is_steady(self):
+        scene = self.d.upload(mesh_scene(*wedge()))
+        found = {self.d.render(scene, {**SIZE, "camera": {"orbit": {"azimuth_deg": a}}},
+                               Accept="application/json").json()["request"]["exposure_ev"]
+                 for a in range(0, 360, 45)}
+        self.assertEqual(len(found), 1, found)
+
+    def test_sky_can_be_switched_off(self):
+        scene = self.d.upload(mesh_scene(*box()))
+        dark = self.picture(scene, sky=False, lights=[], exposure_ev=0)
+        self.assertEqual(max(max(p) for p in dark), 0)
+        self.assertGreater(max(max(p) for p in self.picture(scene, lights=[])), 60)
+
+    def test_what_shines_by_itself(self):
+        scene = self.d.upload(mesh_scene(*box(), color=(0, 0, 0, 1),
+                                         material={"emissiveFactor": [0.25, 0.25, 0.25]}))
+        request = {"sky": False, "lights": [], "exposure_ev": 0, "ground": False}
+        shown = {p for p in self.picture(scene, **request)}
+        self.assertEqual(shown, {(0, 0, 0), (137, 137, 137)})  # sRGB of 0.25
+
+
+if __name__ == "__main__":
+    harness.main()

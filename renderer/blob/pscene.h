@@ -109,7 +109,7 @@ struct psc_material {
     float base_color[4]; /* linear; specular-glossiness: diffuse */
     float emissive[3];   /* linear, W m^-2 sr^-1, strength folded in */
     float metallic, roughness;
-    float specular[3]; /* specular-glossiness: F0 factor */
+    float specular[3]; /* specular-glossiness: F0 factor; else F0 of what is no metal, over 0.04 */
     float glossiness;
     float normal_scale, occlusion_strength, alpha_cutoff;
     uint32_t alpha_mode; /* enum psc_alpha_mode */

@@ -403,10 +403,17 @@ def archives():
     yield "data-length.bundle", packed[:24] + struct.pack("<Q", 2 ** 64 - 1) + packed[32:]
 
 
-def files():
+# Broken by the letter, but drawn, with a warning: what they mean is plain, or only an image is lost.
+TOLERATED = frozenset("""accessor-count-zero image-no-source mime-gif mime-text node-root-is-child
+    node-root-twice truncated-image uri-not-base64-told-image uri-short-image""".split())
+
+
+def files(tolerated=False):
     for group in (references, arithmetic, numbers, graphs, shapes, binaries, pictures, compressed,
                   archives):
-        yield from group()
+        for name, data in group():
+            if (os.path.splitext(name)[0] in TOLERATED) == tolerated:
+                yield name, data
 
 
 def good_files():
@@ -426,7 +433,7 @@ def main():
     for old in os.listdir(folder):
         os.unlink(os.path.join(folder, old))
     names = set()
-    for group in [files()] + ([good_files()] if seeds else []):
+    for group in [files()] + ([files(True), good_files()] if seeds else []):
         for name, data in group:
             assert name not in names, name
             names.add(name)

@@ -238,6 +238,15 @@ class Uploads(unittest.TestCase):
         wait(lambda: self.d.leftovers() == [])
 
     @unittest.skipIf(hostile_files is None, "no hostile files here")
+    def test_tolerated_files(self):
+        for name, data in hostile_files.files(tolerated=True):
+            with self.subTest(name=name):
+                answer = self.post(data, "application/octet-stream")
+                self.assertEqual(answer.status, 201, answer.body)
+                self.assertTrue(answer.json()["warnings"])
+                self.assertEqual(self.d.render(answer.json()["id"], SMALL).status, 200)
+
+    @unittest.skipIf(hostile_files is None, "no hostile files here")
     def test_hostile_files(self):
         scene = self.d.upload(grid_scene(2))
         total = self.d.get("/v1/scenes").json()["total"]

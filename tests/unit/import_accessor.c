@@ -70,6 +70,64 @@ static void component_types(void)
     imported_free(&r);
 }
 
+/* Against the letter of the specification, but only to be read in one way. */
+static void odd_strides(void)
+{
+    const struct {
+        const void *data;
+        size_t bytes;
+        int component, stride;
+        float b[3];
+    } cases[] = {
+        {(int16_t[]){0, 0, 0, 7, 0, 0, 0, 5, 0}, 18, 5122, 6, {7, 0, 0}},
+        {(int8_t[]){0, 0, 0, 7, 0, 0, 0, 5, 0}, 9, 5120, 3, {7, 0, 0}},
+    };
+    for (size_t i = 0; i < 2; i++) {
+        struct imported r =
+            one_triangle(cases[i].data, cases[i].bytes, cases[i].component, false, cases[i].stride);
+        CHECK(r.ok && draws(&r.scene, V(0, 0, 0), cases[i].b, V(0, 5, 0)));
+        CHECK(r.ok && has_warning(&r.scene, "byteStride of bufferView 0"));
+        imported_free(&r);
+    }
+    float far_apart[2 * 75 + 3] = {0};
+    far_apart[75] = 7, far_apart[151] = 5; /* 300 bytes: more than 252 */
+    struct imported r = one_triangle(far_apart, sizeof far_apart, 5126, false, 300);
+    CHECK(r.ok && draws(&r.scene, V(0, 0, 0), V(7, 0, 0), V(0, 5, 0)));
+    CHECK(r.ok && has_warning(&r.scene, "byteStride"));
+    imported_free(&r);
+    r = one_triangle(far_apart, 36, 5126, false, 8); /* elements would overlap */
+    CHECK(!r.ok && strstr(r.error.message, "12 bytes, but byteStride is 8"));
+    imported_free(&r);
+}
+
+/* Views and accessors that hold nothing, beside good ones. */
+static void nothing(void)
+{
+    char *json = text(HEAD
+        "\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0}},"
+        "{\"attributes\":{\"POSITION\":1}}]}],"
+        "\"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":3,\"type\":\"VEC3\"},"
+        "{\"bufferView\":1,\"componentType\":5126,\"count\":0,\"type\":\"VEC3\"}],"
+        "\"bufferViews\":[{\"buffer\":0,\"byteLength\":36},{\"buffer\":0,\"byteOffset\":36,"
+        "\"byteLength\":0},{\"buffer\":1,\"byteLength\":0}],"
+        "\"buffers\":[{\"byteLength\":36,\"uri\":\"data:;base64,%s\"},{\"byteLength\":0}]}",
+        base64((float[9]){0, 0, 0, 1, 0, 0, 0, 1, 0}, 36));
+    struct imported r = import_json(json);
+    CHECK(r.ok && r.scene.primitive_count == 1 &&
+          draws(&r.scene, V(0, 0, 0), V(1, 0, 0), V(0, 1, 0)));
+    CHECK(r.ok && has_warning(&r.scene, "BufferView 1 is empty"));
+    imported_free(&r);
+    free(json);
+    json = text(HEAD "\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0}}]}],"
+                     "\"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":3,"
+                     "\"type\":\"VEC3\"}],\"bufferViews\":[{\"buffer\":0,\"byteLength\":0}],"
+                     "\"buffers\":[{\"byteLength\":0}]}");
+    r = import_json(json);
+    CHECK(!r.ok && strstr(r.error.message, "beyond its bufferView"));
+    imported_free(&r);
+    free(json);
+}
+
 static void index_types(void)
 {
     const float square[12] = {0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0};
@@ -208,6 +266,8 @@ static void meshopt(void)
 int main(void)
 {
     component_types();
+    odd_strides();
+    nothing();
     index_types();
     sparse();
     meshopt();

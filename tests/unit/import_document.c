@@ -53,6 +53,7 @@ static void schema(void)
                   "\"byteLength\":1,\"uri\":\"data:;base64,AA==\"}]}",
         PEN_INVALID, "/bufferViews/0/byteLength", "integer");
     refused("{\"asset\":{\"version\":\"1.0\"}}", PEN_INVALID, "/asset/version", "1.0");
+    refused("{\"asset\":{\"version\":\"1.0\"}}", PEN_INVALID, "/asset/version", "gltf-pipeline -i");
     refused(ASSET "} {}", PEN_INVALID, "", "followed by");
     refused(ASSET ",}", PEN_INVALID, "", "cannot be parsed");
     struct imported r = import_json("\xef\xbb\xbf \n" ASSET "}\r\n"); /* byte order mark, blanks */
@@ -66,8 +67,29 @@ static void extensions(void)
         PEN_INVALID, "/extensionsRequired", "ACME_magic");
     struct imported r = import_json(ASSET ",\"extensionsUsed\":[\"KHR_materials_clearcoat\",\"KHR_"
                                           "texture_transform\",\"A\\u00e9\"]}");
-    CHECK(r.ok && has_warning(&r.scene, "KHR_materials_clearcoat"));
+    CHECK(r.ok && has_warning(&r.scene, "KHR_materials_clearcoat is drawn without its coat"));
     CHECK(r.ok && !has_warning(&r.scene, "KHR_texture_transform") && has_warning(&r.scene, "A??"));
+    imported_free(&r);
+}
+
+/* What is only missing in the shading does not refuse a scene that requires it. */
+static void required_materials(void)
+{
+    const char *const names[] = {"anisotropy", "clearcoat", "diffuse_transmission", "dispersion",
+        "iridescence", "sheen", "transmission", "volume"};
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
+        char *name = text("KHR_materials_%s", names[i]);
+        char *json =
+            text(ASSET ",\"extensionsUsed\":[\"%s\"],\"extensionsRequired\":[\"%s\"]}", name, name);
+        struct imported r = import_json(json);
+        CHECK(r.ok && has_warning(&r.scene, name));
+        imported_free(&r);
+        free(json);
+        free(name);
+    }
+    struct imported r = import_json(ASSET ",\"extensionsRequired\":[\"KHR_materials_ior\","
+                                          "\"KHR_materials_specular\",\"KHR_texture_basisu\"]}");
+    CHECK(r.ok && !has_warning(&r.scene, "extension"));
     imported_free(&r);
 }
 
@@ -157,6 +179,7 @@ int main(void)
     depth();
     schema();
     extensions();
+    required_materials();
     containers();
     data_uris();
     pixel_budgets();

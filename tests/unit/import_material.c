@@ -196,19 +196,89 @@ static void formats(void)
     CHECK(r.ok && !memcmp(texel(&r.scene, 0, 0, 0), four, 8) && texel(&r.scene, 0, 1, 1)[3] == 128);
     imported_free(&r);
     r = one_image((struct bytes){webp, webp_bytes / 2}, "image/webp", "\"source\":0");
-    CHECK(!r.ok && r.error.code == PEN_INVALID);
-    CHECK_STR(r.error.pointer, "/images/0");
+    CHECK(r.ok && has_warning(&r.scene, "Image 0 is drawn plain. The image is damaged"));
+    CHECK(r.ok && !memcmp(texel(&r.scene, 0, 0, 0), (uint8_t[]){255, 255, 255, 255}, 4));
     imported_free(&r);
     WebPFree(webp);
 
     r = one_image((struct bytes){(uint8_t *)"GIF89a..........", 16}, "image/gif", "\"source\":0");
-    CHECK(!r.ok && r.error.code == PEN_INVALID && strstr(r.error.message, "PNG"));
+    CHECK(r.ok && has_warning(&r.scene, "The image is GIF, but neither PNG"));
     imported_free(&r);
     r = one_image((struct bytes){(uint8_t *)"x", 1}, "image/ktx2",
         "\"extensions\":{\"KHR_texture_basisu\":{\"source\":0}}");
-    CHECK(r.ok && has_warning(&r.scene, "left out"));
-    CHECK(r.ok && r.scene.materials[r.scene.primitives[0].material].base.texture == -1);
+    CHECK(r.ok && has_warning(&r.scene, "drawn plain"));
+    CHECK(r.ok && r.scene.image_count == 1 && r.scene.images[0].width == 1);
     imported_free(&r);
+}
+
+/* One image that cannot be decoded, in every role: what it becomes there changes nothing. */
+static void plain(void)
+{
+    struct imported r = import_json(HEAD TRIANGLES(
+        TRIANGLE("0") "," TRIANGLE("1")) ",\"materials\":[{\"pbrMetallicRoughness\":{"
+                                         "\"baseColorTexture\":{\"index\":0},"
+                                         "\"metallicRoughnessTexture\":{\"index\":0}},"
+                                         "\"normalTexture\":{\"index\":0},"
+                                         "\"occlusionTexture\":{\"index\":0},"
+                                         "\"emissiveTexture\":{\"index\":0}},"
+                                         "{\"extensions\":{\"KHR_materials_"
+                                         "pbrSpecularGlossiness\":{"
+                                         "\"specularGlossinessTexture\":{\"index\":0}}}}],"
+                                         "\"textures\":[{\"source\":0}],"
+                                         "\"images\":[{\"uri\":\"data:image/ktx2;base64,"
+                                         "q0tUWCAyMLsNChoK\"}]}");
+    CHECK(r.ok && has_warning(&r.scene, "KTX2"));
+    if (!r.ok)
+        return;
+    const struct psc_material *m = &r.scene.materials[r.scene.primitives[0].material];
+    const struct psc_material *gloss = &r.scene.materials[r.scene.primitives[1].material];
+    const struct {
+        int32_t texture;
+        uint8_t texel[4];
+    } expected[] = {{m->base.texture, {255, 255, 255, 255}},
+        {m->surface.texture, {255, 255, 0, 255}}, /* rough, no metal */
+        {m->normal.texture, {128, 128, 255, 255}}, {m->occlusion.texture, {255, 255, 255, 255}},
+        {m->emission.texture, {0, 0, 0, 255}},
+        {gloss->surface.texture, {56, 56, 56, 128}}}; /* sRGB of 0.04 */
+    for (size_t i = 0; i < sizeof expected / sizeof *expected; i++) {
+        CHECK(expected[i].texture >= 0);
+        uint32_t image = r.scene.textures[expected[i].texture].image;
+        CHECK(!memcmp(texel(&r.scene, image, 0, 0), expected[i].texel, 4));
+    }
+    imported_free(&r);
+}
+
+/* KHR_materials_ior and KHR_materials_specular: F0 = ((n - 1) / (n + 1))^2, times their factors. */
+static void reflectance(void)
+{
+    const struct {
+        const char *extensions;
+        double f0;
+    } cases[] = {{"", 0.04}, {"\"KHR_materials_ior\":{}", 0.04},
+        {"\"KHR_materials_ior\":{\"ior\":1.33}", 0.33 * 0.33 / (2.33 * 2.33)},
+        {"\"KHR_materials_ior\":{\"ior\":2.42}", 1.42 * 1.42 / (3.42 * 3.42)},
+        {"\"KHR_materials_ior\":{\"ior\":1}", 0}, {"\"KHR_materials_ior\":{\"ior\":0}", 1},
+        {"\"KHR_materials_ior\":{\"ior\":-1}", 1},
+        {"\"KHR_materials_specular\":{\"specularFactor\":0.25}", 0.01},
+        {"\"KHR_materials_specular\":{\"specularFactor\":-3}", 0},
+        {"\"KHR_materials_specular\":{\"specularColorFactor\":[50,2,2]}", 1},
+        {"\"KHR_materials_ior\":{\"ior\":2},\"KHR_materials_specular\":{\"specularFactor\":0.5,"
+         "\"specularColorFactor\":[0.5,1,1]}",
+            1.0 / 36}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        char *json =
+            text(HEAD TRIANGLES(TRIANGLE("0")) ",\"extensionsRequired\":[\"KHR_materials_ior\","
+                                               "\"KHR_materials_specular\"],"
+                                               "\"materials\":[{\"extensions\":{%s}}]}",
+                cases[i].extensions);
+        struct imported r = import_json(json);
+        CHECK(r.ok);
+        if (r.ok)
+            CHECK_NEAR(0.04 * r.scene.materials[r.scene.primitives[0].material].specular[0],
+                cases[i].f0, 1e-6);
+        imported_free(&r);
+        free(json);
+    }
 }
 
 static void image_mode(void)
@@ -304,6 +374,8 @@ int main(void)
     factors();
     five_slots();
     formats();
+    plain();
+    reflectance();
     image_mode();
     too_many_pixels();
     reduction();

@@ -49,6 +49,88 @@ static void hierarchy(void)
     imported_free(&r);
 }
 
+/* Scenes that list children: each node is drawn once. */
+static void listed_children(void)
+{
+#define SHIFTED "\"translation\":[0,0,5],\"children\":[1]}," /* node 0, the parent of 1 */
+    const struct {
+        const char *roots;
+        uint32_t instances;
+        float z; /* of node 1 */
+        const char *warning;
+    } cases[] = {{"[0]", 2, 6, NULL}, {"[0,1]", 2, 6, "beside its parent"},
+        {"[1,0]", 2, 6, "beside its parent"}, {"[1]", 2, 1, "not its parent 0"},
+        {"[2]", 1, 0, "not its parent 1"}, {"[2,0]", 2, 6, "beside its parent"},
+        {"[2,1]", 2, 1, "not its parent 0"}, {"[1,1]", 2, 1, "not its parent"},
+        {"[0,0]", 2, 6, "twice"}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        char *json = text(START "\"scenes\":[{\"nodes\":%s}],\"nodes\":[{" SHIFTED
+                                "{\"translation\":[0,0,1],\"mesh\":0,\"children\":[2]},"
+                                "{\"mesh\":0}]," MESH,
+            cases[i].roots);
+        struct imported r = import_json(json);
+        float z = cases[i].z;
+        CHECK(r.ok && r.scene.instance_count == cases[i].instances);
+        CHECK(r.ok && draws(&r.scene, V(0, 0, z), V(1, 0, z), V(0, 1, z)));
+        CHECK(r.ok && (cases[i].warning ? has_warning(&r.scene, cases[i].warning)
+                                        : !r.scene.warning_bytes));
+        imported_free(&r);
+        free(json);
+    }
+}
+
+/* KHR_node_visibility: nothing at or below a hidden node is drawn or lit; cameras stay. */
+static void visibility(void)
+{
+#define HIDDEN(value) "\"extensions\":{\"KHR_node_visibility\":{" value "}}"
+    struct imported r = import_json(START
+        "\"scenes\":[{\"nodes\":[0,3,4]}],\"extensionsRequired\":[\"KHR_node_visibility\"],"
+        "\"nodes\":[{\"mesh\":0,\"children\":[1]," HIDDEN(
+            "\"visible\":false") "},"
+                                 "{\"mesh\":0,\"camera\":0,\"children\":[2]," HIDDEN(
+                                     "\"visible\":true") "},"
+                                                         "{\"extensions\":{\"KHR_lights_punctual\":"
+                                                         "{\"light\":0}}},"
+                                                         "{\"mesh\":0,\"translation\":[3,0,0]"
+                                                         "," HIDDEN(
+                                                             "") "},"
+                                                                 "{\"mesh\":0,\"translation\":[0,7,"
+                                                                 "0]," HIDDEN(
+                                                                     "\"visible\":true") "}],"
+                                                                                         "\"cameras"
+                                                                                         "\":[{"
+                                                                                         "\"type\":"
+                                                                                         "\"perspec"
+                                                                                         "tive\","
+                                                                                         "\"perspec"
+                                                                                         "tive\":{"
+                                                                                         "\"yfov\":"
+                                                                                         "1,"
+                                                                                         "\"znear\""
+                                                                                         ":1}}],"
+                                                                                         "\"extensi"
+                                                                                         "ons\":{"
+                                                                                         "\"KHR_"
+                                                                                         "lights_"
+                                                                                         "punctual"
+                                                                                         "\":{"
+                                                                                         "\"lights"
+                                                                                         "\":[{"
+                                                                                         "\"type\":"
+                                                                                         "\"point\""
+                                                                                         "}]}}"
+                                                                                         "," MESH);
+    CHECK(r.ok && r.scene.instance_count == 2 && r.scene.light_count == 0);
+    CHECK(r.ok && r.scene.camera_count == 1 && !r.scene.warning_bytes);
+    CHECK(r.ok && draws(&r.scene, V(3, 0, 0), V(4, 0, 0), V(3, 1, 0)));
+    CHECK(r.ok && draws(&r.scene, V(0, 7, 0), V(1, 7, 0), V(0, 8, 0)));
+    CHECK(r.ok && r.scene.header->bounds_max[1] == 8 && r.scene.header->bounds_min[1] == 0);
+    imported_free(&r);
+    r = import_json(START "\"scenes\":[{}],\"nodes\":[{" HIDDEN("\"visible\":0") "}]," MESH);
+    CHECK(!r.ok && !strcmp(r.error.pointer, "/nodes/0/extensions/KHR_node_visibility/visible"));
+    imported_free(&r);
+}
+
 static void gpu_instancing(void)
 {
     struct {
@@ -174,6 +256,8 @@ static void cameras(void)
 int main(void)
 {
     hierarchy();
+    listed_children();
+    visibility();
     gpu_instancing();
     lights();
     cameras();

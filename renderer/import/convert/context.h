@@ -4,10 +4,22 @@
 #include "renderer/import/document/document.h"
 #include "renderer/import/document/gltf_tiny.h"
 
-/* A psc image to be: the same glTF image read as sRGB and as linear data is two of them. */
+/* What a texture is for. */
+enum imp_role {
+    IMP_BASE,
+    IMP_GLOSS,
+    IMP_EMISSION,
+    IMP_SURFACE,
+    IMP_NORMAL,
+    IMP_OCCLUSION,
+    IMP_ROLES
+};
+
+/* A psc image to be: the same glTF image read as sRGB and as linear data is two of them, and one
+ * that cannot be decoded stands for something else in every role. */
 struct imp_image_slot {
-    uint32_t image; /* glTF's number */
-    bool srgb;
+    uint32_t image; /* glTF's number; IMP_NOT_YET: none that can be read */
+    enum imp_role role;
 };
 
 struct imp_context {
@@ -22,7 +34,7 @@ struct imp_context {
     uint32_t *primitives; /* psc number of each glTF primitive, or one of the two below */
     /* psc number of each glTF material and, last, of none; UINT32_MAX: not yet. */
     uint32_t *materials;
-    uint32_t *textures; /* psc number of each glTF texture: [0] linear, [1] sRGB */
+    uint32_t *textures; /* psc number of each glTF texture in each role */
     struct imp_image_slot *image_slots;
     uint32_t image_slot_count;
 
@@ -64,8 +76,9 @@ uint32_t imp_material(struct imp_context *context, int32_t material);
 /* True when it needs tangents. */
 bool imp_material_has_normal_map(const struct imp_context *context, int32_t material);
 
-/* texture.c: the psc texture of a glTF texture; -1 when it has no image that can be read. */
-int32_t imp_texture(struct imp_context *context, int32_t texture, bool srgb);
+/* texture.c: the psc texture of a glTF texture; -1 when there is no such texture. One without an
+ * image that can be decoded becomes plain, so that the material's other values show. */
+int32_t imp_texture(struct imp_context *context, int32_t texture, enum imp_role role);
 /* Decodes every image that a texture asked for, in the order of their slots. */
 bool imp_add_images(struct imp_context *context, struct pen_error *error);
 

@@ -5,12 +5,12 @@
 /* KHR_texture_transform as uv' = T R S uv. The angle turns counter-clockwise as seen with v
  * pointing down, hence the signs: what the text of the extension says and viewers do. */
 static struct psc_texture_ref texture_ref(
-    struct imp_context *context, const struct gltf_texture_info *info, bool srgb)
+    struct imp_context *context, const struct gltf_texture_info *info, enum imp_role role)
 {
     struct psc_texture_ref ref = psc_material_default().base;
     if (info->texture < 0)
         return ref;
-    ref.texture = imp_texture(context, info->texture, srgb);
+    ref.texture = imp_texture(context, info->texture, role);
     if (info->uv_set > 1)
         imp_warn(context, "Only the texture coordinate sets 0 and 1 are used; set %u becomes 0.",
             info->uv_set);
@@ -26,6 +26,8 @@ static struct psc_texture_ref texture_ref(
     return ref;
 }
 
+#define STRONGEST 25 /* of 0.04: everything is reflected */
+
 static float clamp01(float x)
 {
     return x > 0 ? fminf(x, 1) : 0;
@@ -38,7 +40,8 @@ static struct psc_material convert(struct imp_context *context, const struct glt
         to.base_color[i] = clamp01(from->base_color[i]);
     for (int i = 0; i < 3; i++) {
         to.emissive[i] = fminf(fmaxf(from->emissive[i] * from->emissive_strength, 0), 1e9f);
-        to.specular[i] = clamp01(from->specular[i]);
+        to.specular[i] =
+            fminf(fmaxf(from->specular[i], 0), from->specular_glossiness ? 1 : STRONGEST);
     }
     to.metallic = clamp01(from->metallic);
     to.roughness = clamp01(from->roughness);
@@ -54,11 +57,12 @@ static struct psc_material convert(struct imp_context *context, const struct glt
         imp_warn(context, "A material's unknown alphaMode is taken for OPAQUE.");
     to.flags = (from->double_sided ? PSC_DOUBLE_SIDED : 0) | (from->unlit ? PSC_UNLIT : 0) |
                (from->specular_glossiness ? PSC_SPECULAR_GLOSSINESS : 0);
-    to.base = texture_ref(context, &from->base, true);
-    to.surface = texture_ref(context, &from->surface, from->specular_glossiness);
-    to.normal = texture_ref(context, &from->normal, false);
-    to.occlusion = texture_ref(context, &from->occlusion, false);
-    to.emission = texture_ref(context, &from->emission, true);
+    to.base = texture_ref(context, &from->base, IMP_BASE);
+    to.surface =
+        texture_ref(context, &from->surface, from->specular_glossiness ? IMP_GLOSS : IMP_SURFACE);
+    to.normal = texture_ref(context, &from->normal, IMP_NORMAL);
+    to.occlusion = texture_ref(context, &from->occlusion, IMP_OCCLUSION);
+    to.emission = texture_ref(context, &from->emission, IMP_EMISSION);
     return to;
 }
 

@@ -16,9 +16,54 @@ static bool node_fail(struct pen_error *error, enum pen_code code, uint32_t node
     return pen_fail(error, code, pointer, "glTF %s: %s.", pointer, what);
 }
 
-/* Every node has at most one parent and none is its own ancestor: then the walk below ends. */
-static bool check_forest(const struct gltf_model *model, struct pen_error *error)
+struct roots {
+    uint32_t *nodes, count;
+};
+
+/* A scene should list only nodes without parents. A node whose parent it draws as well is drawn
+ * with it; one whose parent it does not draw is drawn without, as the common viewers do. `listed`
+ * is overwritten. */
+static void choose_roots(
+    struct imp_context *context, const uint32_t *parent, uint32_t *listed, struct roots *roots)
 {
+    const struct gltf_model *model = context->model;
+    memset(listed, 0, model->node_count * sizeof *listed);
+    for (uint32_t i = 0; i < model->root_count; i++)
+        listed[model->roots[i]]++;
+    roots->nodes = pen_alloc_zero(model->root_count, sizeof *roots->nodes);
+    uint32_t twice = UINT32_MAX, child = UINT32_MAX, lone = UINT32_MAX;
+    for (uint32_t i = 0; i < model->root_count; i++) {
+        uint32_t node = (uint32_t)model->roots[i], at = parent[node];
+        for (uint32_t up = 0; at && !listed[at - 1] && up < IMP_MAX_NODE_DEPTH; up++)
+            at = parent[at - 1];
+        bool drawn_above = at && listed[at - 1];
+        if (drawn_above && child == UINT32_MAX)
+            child = node;
+        else if (!drawn_above && parent[node] && lone == UINT32_MAX)
+            lone = node;
+        else if (listed[node] > 1 && listed[node] != UINT32_MAX && twice == UINT32_MAX)
+            twice = node;
+        if (!drawn_above && listed[node] != UINT32_MAX)
+            roots->nodes[roots->count++] = node;
+        listed[node] = UINT32_MAX; /* has been here */
+    }
+    if (child != UINT32_MAX)
+        imp_warn(context,
+            "The scene lists node %u beside its parent: it is drawn once, where its parent is.",
+            child);
+    if (lone != UINT32_MAX)
+        imp_warn(context,
+            "The scene lists node %u, but not its parent %u: it is drawn without it, as other "
+            "viewers do.",
+            lone, parent[lone] - 1);
+    if (twice != UINT32_MAX)
+        imp_warn(context, "The scene lists node %u twice: it is drawn once.", twice);
+}
+
+/* Every node has at most one parent and none is its own ancestor: then the walk below ends. */
+static bool check_forest(struct imp_context *context, struct roots *roots, struct pen_error *error)
+{
+    const struct gltf_model *model = context->model;
     uint32_t n = model->node_count;
     uint32_t *parent = pen_alloc_zero(n, sizeof *parent); /* plus 1; 0: none */
     uint32_t *seen = pen_alloc_zero(n, sizeof *seen);     /* by the climb from this node, plus 1 */
@@ -31,6 +76,9 @@ static bool check_forest(const struct gltf_model *model, struct pen_error *error
             else
                 parent[child] = i + 1;
         }
+    for (uint32_t i = 0; done && i < model->root_count; i++)
+        if ((uint32_t)model->roots[i] >= n)
+            done = node_fail(error, PEN_INVALID, (uint32_t)model->roots[i], "it does not exist");
     for (uint32_t i = 0; done && i < n; i++) {
         uint32_t at = i + 1;
         while (at && !seen[at - 1]) {
@@ -40,15 +88,8 @@ static bool check_forest(const struct gltf_model *model, struct pen_error *error
         if (at && seen[at - 1] == i + 1)
             done = node_fail(error, PEN_INVALID, at - 1, "it is its own ancestor");
     }
-    for (uint32_t i = 0; i < n; i++)
-        seen[i] = 0;
-    for (uint32_t i = 0; done && i < model->root_count; i++) {
-        uint32_t root = (uint32_t)model->roots[i];
-        if (root >= n || parent[root])
-            done = node_fail(error, PEN_INVALID, root, "a scene's node has a parent");
-        else if (seen[root]++)
-            done = node_fail(error, PEN_INVALID, root, "the scene names it twice");
-    }
+    if (done)
+        choose_roots(context, parent, seen, roots);
     free(parent);
     free(seen);
     return done;
@@ -156,21 +197,21 @@ struct walk {
     uint32_t camera_count;
 };
 
-static bool visit(
-    struct walk *walk, uint32_t number, const double world[12], struct pen_error *error)
+static bool visit(struct walk *walk, uint32_t number, const double world[12], bool hidden,
+    struct pen_error *error)
 {
     struct imp_context *context = walk->context;
     const struct gltf_model *model = context->model;
     const struct gltf_node *node = &model->nodes[number];
     if (node->skin >= 0)
         imp_warn(context, "Skins are ignored: meshes are drawn at rest.");
-    if (node->mesh >= 0 && (uint32_t)node->mesh < model->mesh_count &&
+    if (!hidden && node->mesh >= 0 && (uint32_t)node->mesh < model->mesh_count &&
         !(node->instanced ? add_instances(context, node, number, world, error)
                           : add_mesh_at(context, node, number, world, error)))
         return false;
-    if (node->light >= 0 && (uint32_t)node->light < model->light_count)
+    if (!hidden && node->light >= 0 && (uint32_t)node->light < model->light_count)
         imp_add_light(context, &model->lights[node->light], node, world);
-    if (node->area_light >= 0 && (uint32_t)node->area_light < model->area_light_count)
+    if (!hidden && node->area_light >= 0 && (uint32_t)node->area_light < model->area_light_count)
         imp_add_light(context, &model->area_lights[node->area_light], node, world);
     if (node->camera >= 0 && (uint32_t)node->camera < model->camera_count &&
         walk->camera_count <= IMP_MAX_LIGHTS) { /* the one too many draws the warning */
@@ -183,6 +224,7 @@ static bool visit(
 
 struct frame {
     uint32_t node, next_child;
+    bool hidden; /* KHR_node_visibility: it, or a node above; cameras are there nevertheless */
     double world[12];
 };
 
@@ -193,8 +235,9 @@ static bool walk_tree(
     uint32_t depth = 1;
     stack[0].node = root;
     stack[0].next_child = 0;
+    stack[0].hidden = model->nodes[root].hidden;
     local_matrix(&model->nodes[root], stack[0].world);
-    if (!visit(walk, root, stack[0].world, error))
+    if (!visit(walk, root, stack[0].world, stack[0].hidden, error))
         return false;
     while (depth) {
         struct frame *top = &stack[depth - 1];
@@ -210,9 +253,10 @@ static bool walk_tree(
         double local[12];
         next->node = child;
         next->next_child = 0;
+        next->hidden = top->hidden || model->nodes[child].hidden;
         local_matrix(&model->nodes[child], local);
         psc_affine_multiply(top->world, local, next->world);
-        if (!visit(walk, child, next->world, error))
+        if (!visit(walk, child, next->world, next->hidden, error))
             return false;
     }
     return true;
@@ -221,18 +265,20 @@ static bool walk_tree(
 bool imp_add_nodes(struct imp_context *context, struct pen_error *error)
 {
     const struct gltf_model *model = context->model;
-    if (!check_forest(model, error))
+    struct roots roots = {0};
+    if (!check_forest(context, &roots, error))
         return false;
     struct walk walk = {
         .context = context, .cameras = pen_alloc_zero(IMP_MAX_LIGHTS + 1, sizeof *walk.cameras)};
     struct frame *stack = pen_alloc_zero(IMP_MAX_NODE_DEPTH, sizeof *stack);
     bool done = true;
-    for (uint32_t i = 0; done && i < model->root_count; i++)
-        done = walk_tree(&walk, stack, (uint32_t)model->roots[i], error);
+    for (uint32_t i = 0; done && i < roots.count; i++)
+        done = walk_tree(&walk, stack, roots.nodes[i], error);
     for (uint32_t i = 0; done && i < walk.camera_count; i++) {
         const struct gltf_node *node = &model->nodes[walk.cameras[i].node];
         imp_add_camera(context, &model->cameras[node->camera], node, walk.cameras[i].world);
     }
+    free(roots.nodes);
     free(stack);
     free(walk.cameras);
     return done;

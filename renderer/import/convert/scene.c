@@ -41,9 +41,9 @@ bool imp_convert(struct imp_document *document, struct gltf_model *model,
         .optimiser_work = IMP_MAX_OPTIMISER_WORK,
         .primitives = not_yet(model->primitive_count),
         .materials = not_yet((size_t)model->material_count + 1),
-        .textures = not_yet(2 * (size_t)model->texture_count),
-        .image_slots =
-            pen_alloc_zero(2 * (size_t)document->image_count, sizeof(struct imp_image_slot)),
+        .textures = not_yet(IMP_ROLES * (size_t)model->texture_count),
+        .image_slots = pen_alloc_zero(
+            IMP_ROLES * ((size_t)document->image_count + 1), sizeof(struct imp_image_slot)),
         .bounds_min = {INFINITY, INFINITY, INFINITY},
         .bounds_max = {-INFINITY, -INFINITY, -INFINITY},
         .primitive_bounds = pen_alloc_zero(model->primitive_count, sizeof(struct primitive_bounds)),

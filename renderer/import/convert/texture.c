@@ -43,32 +43,56 @@ static uint32_t filters(const struct gltf_sampler *sampler)
     return bits;
 }
 
-static uint32_t image_slot(struct imp_context *context, uint32_t image, bool srgb)
+static bool is_srgb(enum imp_role role)
 {
-    for (uint32_t i = 0; i < context->image_slot_count; i++)
-        if (context->image_slots[i].image == image && context->image_slots[i].srgb == srgb)
+    return role <= IMP_EMISSION;
+}
+
+/* What stands in for an image: white leaves the material's own colour, a surface is rough and no
+ * metal (or reflects 4 %), a normal is the vertices', and nothing glows. */
+static const uint8_t neutral[IMP_ROLES][4] = {[IMP_BASE] = {255, 255, 255, 255},
+    [IMP_GLOSS] = {56, 56, 56, 128},
+    [IMP_EMISSION] = {0, 0, 0, 255},
+    [IMP_SURFACE] = {255, 255, 0, 255},
+    [IMP_NORMAL] = {128, 128, 255, 255},
+    [IMP_OCCLUSION] = {255, 255, 255, 255}};
+
+static uint32_t image_slot(struct imp_context *context, uint32_t image, enum imp_role role)
+{
+    uint32_t width, height;
+    bool readable = image != IMP_NOT_YET &&
+                    imp_image_header(context->document->images[image].data, &width, &height, NULL);
+    for (uint32_t i = 0; i < context->image_slot_count; i++) {
+        const struct imp_image_slot *slot = &context->image_slots[i];
+        if (slot->image == image &&
+            (readable ? is_srgb(slot->role) == is_srgb(role) : slot->role == role))
             return i;
-    context->image_slots[context->image_slot_count] = (struct imp_image_slot){image, srgb};
+    }
+    context->image_slots[context->image_slot_count] = (struct imp_image_slot){image, role};
     return context->image_slot_count++;
 }
 
-int32_t imp_texture(struct imp_context *context, int32_t number, bool srgb)
+int32_t imp_texture(struct imp_context *context, int32_t number, enum imp_role role)
 {
     if (number < 0 || (uint32_t)number >= context->model->texture_count)
         return -1;
     const struct gltf_texture *from = &context->model->textures[number];
-    if (from->image < 0 || (uint32_t)from->image >= context->document->image_count) {
-        imp_warn(context, "A texture without a PNG, JPEG or WebP image is left out.");
-        return -1;
-    }
-    uint32_t *known = &context->textures[2 * number + srgb];
+    bool has_image = from->image >= 0 && (uint32_t)from->image < context->document->image_count;
+    if (!has_image)
+        imp_warn(context, "A texture without a PNG, JPEG or WebP image is drawn plain.");
+    uint32_t *roles = &context->textures[IMP_ROLES * (uint32_t)number], *known = &roles[role];
+    uint32_t image = has_image ? (uint32_t)from->image : IMP_NOT_YET;
+    uint32_t slot = image_slot(context, image, role);
+    for (int other = 0; *known == IMP_NOT_YET && other < IMP_ROLES; other++)
+        if (roles[other] != IMP_NOT_YET && image_slot(context, image, other) == slot)
+            *known = roles[other];
     if (*known == IMP_NOT_YET) {
         const struct gltf_sampler usual = {-1, -1, 0, 0};
         const struct gltf_sampler *sampler =
             from->sampler >= 0 && (uint32_t)from->sampler < context->model->sampler_count
                 ? &context->model->samplers[from->sampler]
                 : &usual;
-        const struct psc_texture to = {.image = image_slot(context, (uint32_t)from->image, srgb),
+        const struct psc_texture to = {.image = slot,
             .wrap_s = wrap(sampler->wrap_s),
             .wrap_t = wrap(sampler->wrap_t),
             .nearest = filters(sampler)};
@@ -80,6 +104,7 @@ int32_t imp_texture(struct imp_context *context, int32_t number, bool srgb)
 /* How an image will be added: its size as uploaded, halved so many times. */
 struct plan {
     uint32_t width, height, halvings;
+    bool plain; /* it cannot be decoded */
 };
 
 static uint64_t planned_pixels(const struct plan *plan)
@@ -88,13 +113,18 @@ static uint64_t planned_pixels(const struct plan *plan)
     return (w ? w : 1) * (h ? h : 1);
 }
 
-/* The message of an image's decoder, with the image's place in the document. */
-static bool image_fail(uint32_t image, const struct pen_error *why, struct pen_error *error)
+/* An image that is too big is refused, with its place in the document; one that cannot be decoded
+ * is drawn plain. */
+static bool go_on_without(struct imp_context *context, uint32_t image, const struct pen_error *why,
+    struct plan *plan, struct pen_error *error)
 {
     char pointer[64];
     snprintf(pointer, sizeof pointer, "/images/%u", image);
-    return pen_fail(error, why->code == PEN_TOO_BIG ? PEN_TOO_BIG : PEN_INVALID, pointer,
-        "glTF %s: %s", pointer, why->message);
+    if (why->code == PEN_TOO_BIG)
+        return pen_fail(error, PEN_TOO_BIG, pointer, "glTF %s: %s", pointer, why->message);
+    imp_warn(context, "Image %u is drawn plain. %s", image, why->message);
+    *plan = (struct plan){1, 1, 0, true};
+    return true;
 }
 
 /* Reads every header, keeps to the budgets, and halves the largest images until all fit. */
@@ -104,10 +134,17 @@ static bool plan_images(struct imp_context *context, struct plan *plans, struct 
     for (uint32_t i = 0; i < context->image_slot_count; i++) {
         struct plan *plan = &plans[i];
         uint32_t number = context->image_slots[i].image;
+        if (number == IMP_NOT_YET) {
+            *plan = (struct plan){1, 1, 0, true};
+            continue;
+        }
         const struct imp_image *image = &context->document->images[number];
         struct pen_error why = {0};
-        if (!imp_image_header(image->data, &plan->width, &plan->height, &why))
-            return image_fail(number, &why, error);
+        if (!imp_image_header(image->data, &plan->width, &plan->height, &why)) {
+            if (!go_on_without(context, number, &why, plan, error))
+                return false;
+            continue;
+        }
         const char *mime = imp_image_mime(imp_image_sniff(image->data));
         if (image->mime[0] && strcasecmp(image->mime, mime) &&
             strcasecmp(image->mime, "application/octet-stream"))
@@ -135,32 +172,38 @@ static bool plan_images(struct imp_context *context, struct plan *plans, struct 
     return true;
 }
 
+static bool add_image(struct imp_context *context, const struct imp_image_slot *slot,
+    struct plan *plan, struct pen_error *error)
+{
+    uint32_t width = plan->width, height = plan->height;
+    struct pen_error why = {0};
+    uint8_t *rgba = NULL;
+    bool damaged = false, srgb = is_srgb(slot->role);
+    if (!plan->plain && !imp_image_decode(context->document->images[slot->image].data, width,
+                            height, &rgba, &damaged, &why)) {
+        if (!go_on_without(context, slot->image, &why, plan, error))
+            return false;
+        width = height = 1;
+    }
+    if (damaged)
+        imp_warn(context, "Image %u is damaged; parts of it may be missing.", slot->image);
+    for (uint32_t k = 0; k < plan->halvings; k++)
+        imp_image_halve(rgba, &width, &height, srgb);
+    if (plan->halvings)
+        imp_warn(context, "Image %u was reduced from %u x %u to %u x %u pixels.", slot->image,
+            plan->width, plan->height, width, height);
+    psc_builder_add_image(
+        context->builder, width, height, srgb, plan->plain ? neutral[slot->role] : rgba);
+    free(rgba);
+    return true;
+}
+
 bool imp_add_images(struct imp_context *context, struct pen_error *error)
 {
     struct plan *plans = pen_alloc_zero(context->image_slot_count, sizeof *plans);
     bool done = plan_images(context, plans, error);
-    for (uint32_t i = 0; done && i < context->image_slot_count; i++) {
-        const struct imp_image_slot *slot = &context->image_slots[i];
-        uint32_t width = plans[i].width, height = plans[i].height;
-        struct pen_error why = {0};
-        uint8_t *rgba;
-        bool damaged;
-        done = imp_image_decode(
-            context->document->images[slot->image].data, width, height, &rgba, &damaged, &why);
-        if (!done) {
-            image_fail(slot->image, &why, error);
-            break;
-        }
-        if (damaged)
-            imp_warn(context, "Image %u is damaged; parts of it may be missing.", slot->image);
-        for (uint32_t k = 0; k < plans[i].halvings; k++)
-            imp_image_halve(rgba, &width, &height, slot->srgb);
-        if (plans[i].halvings)
-            imp_warn(context, "Image %u was reduced from %u x %u to %u x %u pixels.", slot->image,
-                plans[i].width, plans[i].height, width, height);
-        psc_builder_add_image(context->builder, width, height, slot->srgb, rgba);
-        free(rgba);
-    }
+    for (uint32_t i = 0; done && i < context->image_slot_count; i++)
+        done = add_image(context, &context->image_slots[i], &plans[i], error);
     free(plans);
     return done;
 }

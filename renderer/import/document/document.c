@@ -1,5 +1,6 @@
 #include "renderer/import/document/document.h"
 #include "protocol/memory.h"
+#include "renderer/blob/builder.h"
 #include "renderer/import/base/budget.h"
 #include "renderer/import/document/schema.h"
 #include "renderer/import/base/text.h"
@@ -11,6 +12,9 @@
 
 #define GLB_JSON 0x4e4f534au
 #define GLB_BIN 0x004e4942u
+
+#define CONVERT_OLD                                                                                \
+    "A tool such as gltf-pipeline (gltf-pipeline -i old.gltf -o new.glb) converts files of 1.0."
 
 static uint32_t u32(const uint8_t *p)
 {
@@ -27,7 +31,8 @@ static bool split_glb(const uint8_t *data, size_t bytes, struct imp_bytes *json,
         return pen_fail(error, PEN_INVALID, "", "The glTF binary is truncated.");
     if (u32(data + 4) != 2)
         return pen_fail(error, PEN_INVALID, "",
-            "The glTF binary has version %u; only version 2 can be read.", u32(data + 4));
+            "The file is glTF binary of version %u; only version 2 can be read. " CONVERT_OLD,
+            u32(data + 4));
     size_t length = u32(data + 8);
     if (length > bytes || length < 20)
         return pen_fail(error, PEN_INVALID, "",
@@ -76,7 +81,8 @@ static bool parse(struct imp_document *document, struct imp_bytes json, struct p
     const char *least = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(asset, "minVersion"));
     if (version && (strncmp(version, "2.", 2) || (least && strcmp(least, "2.0"))))
         return pen_fail(error, PEN_INVALID, "/asset/version",
-            "The glTF has version %s; only 2.0 can be read.", imp_text(least ? least : version).s);
+            "The file is glTF %s; only 2.0 can be read. " CONVERT_OLD,
+            imp_text(least ? least : version).s);
     return imp_schema_check(document->root, error);
 }
 
@@ -121,12 +127,39 @@ static bool open_buffers(struct imp_document *document, struct imp_bytes bin,
     return true;
 }
 
-static bool open_views(struct imp_document *document, struct pen_error *error)
+/* What the specification forbids, but can only be meant in one way. */
+static void warn_of_views(const cJSON *items, struct psc_builder *builder)
+{
+    const cJSON *item;
+    uint32_t i = 0, odd = UINT32_MAX, empty = UINT32_MAX;
+    cJSON_ArrayForEach(item, items)
+    {
+        const cJSON *stride = cJSON_GetObjectItemCaseSensitive(item, "byteStride");
+        const cJSON *bytes = cJSON_GetObjectItemCaseSensitive(item, "byteLength");
+        uint32_t step = stride ? (uint32_t)stride->valuedouble : 4;
+        if (odd == UINT32_MAX && (step % 4 || step > 252 || !step))
+            odd = i;
+        if (empty == UINT32_MAX && bytes->valuedouble < 1)
+            empty = i;
+        i++;
+    }
+    if (odd != UINT32_MAX)
+        psc_builder_add_warning(builder,
+            "The byteStride of bufferView %u is not a multiple of 4 from 4 to 252, as glTF wants; "
+            "it is used as it is.",
+            odd);
+    if (empty != UINT32_MAX)
+        psc_builder_add_warning(builder, "BufferView %u is empty.", empty);
+}
+
+static bool open_views(
+    struct imp_document *document, struct psc_builder *builder, struct pen_error *error)
 {
     const cJSON *items = cJSON_GetObjectItemCaseSensitive(document->root, "bufferViews"), *item;
     document->view_count = (uint32_t)cJSON_GetArraySize(items);
     document->views = pen_alloc_zero(document->view_count, sizeof *document->views);
     uint32_t i = 0;
+    warn_of_views(items, builder);
     cJSON_ArrayForEach(item, items)
     {
         struct imp_view *view = &document->views[i];
@@ -142,17 +175,15 @@ static bool open_views(struct imp_document *document, struct pen_error *error)
         struct imp_bytes buffer =
             document
                 ->buffers[(size_t)cJSON_GetObjectItemCaseSensitive(item, "buffer")->valuedouble];
-        if (!buffer.data)
+        if (!buffer.data && bytes)
             return pen_fail(error, PEN_INVALID, pointer,
                 "glTF %s: its buffer has neither a uri nor a binary chunk.", pointer);
         if (first > buffer.bytes || bytes > buffer.bytes - first)
             return pen_fail(error, PEN_INVALID, pointer,
                 "glTF %s: it reaches beyond its buffer of %zu bytes.", pointer, buffer.bytes);
-        *view = (struct imp_view){
-            buffer.data + first, bytes, stride ? (uint32_t)stride->valuedouble : 0};
-        if (view->stride % 4)
-            return pen_fail(error, PEN_INVALID, pointer,
-                "glTF %s: byteStride is not a multiple of 4.", pointer);
+        static const uint8_t nothing;
+        *view = (struct imp_view){buffer.data ? buffer.data + first : &nothing, bytes,
+            stride ? (uint32_t)stride->valuedouble : 0};
     }
     return imp_document_unpack_views(document, error);
 }
@@ -173,9 +204,9 @@ static bool open_images(struct imp_document *document, struct imp_files *files, 
         image->mime = mime ? mime : "";
         cJSON *uri = cJSON_GetObjectItemCaseSensitive(item, "uri");
         const cJSON *view = cJSON_GetObjectItemCaseSensitive(item, "bufferView");
-        if (!uri == !view)
-            return pen_fail(error, PEN_INVALID, pointer,
-                "glTF %s: it needs either a uri or a bufferView.", pointer);
+        if (uri && view)
+            return pen_fail(
+                error, PEN_INVALID, pointer, "glTF %s: it has a uri and a bufferView.", pointer);
         if (uri && !fetch(uri, files, name, pointer, &image->mime, &image->data, error))
             return false;
         if (view) {
@@ -198,6 +229,13 @@ static void render_rest(struct imp_document *document)
         else
             cJSON_Delete(item);
     }
+    /* The views are read; tinygltf only has to find that they exist, and is strict about them. */
+    cJSON *item;
+    cJSON_ArrayForEach(item, cJSON_GetObjectItemCaseSensitive(document->root, "bufferViews"))
+    {
+        cJSON_DeleteItemFromObjectCaseSensitive(item, "byteStride");
+        cJSON_SetNumberValue(cJSON_GetObjectItemCaseSensitive(item, "byteLength"), 1);
+    }
     document->text = cJSON_PrintUnformatted(document->root);
     if (!kept || !document->text)
         abort();
@@ -214,7 +252,7 @@ bool imp_document_open(struct imp_document *document, const uint8_t *data, size_
     if (bytes >= 4 && !memcmp(data, "glTF", 4) && !split_glb(data, bytes, &json, &bin, error))
         return false;
     if (!parse(document, json, error) || !imp_extensions_check(document->root, builder, error) ||
-        !open_buffers(document, bin, files, name, error) || !open_views(document, error) ||
+        !open_buffers(document, bin, files, name, error) || !open_views(document, builder, error) ||
         !open_images(document, files, name, error))
         goto fail;
     document->animation_count = (uint32_t)cJSON_GetArraySize(

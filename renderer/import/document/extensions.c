@@ -4,55 +4,83 @@
 #include <cjson/cJSON.h>
 #include <string.h>
 
-static const char *const supported[] = {
-    "EXT_lights_area",
-    "EXT_mesh_gpu_instancing",
-    "EXT_meshopt_compression",
-    "EXT_texture_webp",
-    "KHR_lights_punctual",
-    "KHR_materials_emissive_strength",
-    "KHR_materials_pbrSpecularGlossiness",
-    "KHR_materials_unlit",
-    "KHR_mesh_quantization",
-    "KHR_texture_transform",
+/* What is known, and what of it is missing in the picture: "" nothing, else the rest of a sentence
+ * that becomes a warning. All others are refused when they are required. */
+static const struct {
+    const char *name, *missing;
+} known[] = {
+    {"EXT_lights_area", ""},
+    {"EXT_mesh_gpu_instancing", ""},
+    {"EXT_mesh_manifold", ""},
+    {"EXT_meshopt_compression", ""},
+    {"EXT_texture_avif", "is not decoded: such textures are drawn by their fallbacks, or plain"},
+    {"EXT_texture_webp", ""},
+    {"KHR_animation_pointer", ""},
+    {"KHR_draco_mesh_compression", ""}, /* used: the uncompressed accessors are there as well */
+    {"KHR_lights_punctual", ""},
+    {"KHR_materials_anisotropy", "is drawn without its direction: highlights are round"},
+    {"KHR_materials_clearcoat", "is drawn without its coat"},
+    {"KHR_materials_diffuse_transmission", "is drawn without light from behind"},
+    {"KHR_materials_dispersion", "is drawn without colours at edges"},
+    {"KHR_materials_emissive_strength", ""},
+    {"KHR_materials_ior", ""},
+    {"KHR_materials_iridescence", "is drawn without its colours of thin films"},
+    {"KHR_materials_pbrSpecularGlossiness", ""},
+    {"KHR_materials_sheen", "is drawn without its sheen"},
+    {"KHR_materials_specular", ""},
+    {"KHR_materials_transmission", "is drawn opaque: nothing shines through"},
+    {"KHR_materials_unlit", ""},
+    {"KHR_materials_variants", ""},
+    {"KHR_materials_volume", "is drawn without depth: nothing is absorbed or bent inside"},
+    {"KHR_mesh_quantization", ""},
+    {"KHR_node_hoverability", ""},
+    {"KHR_node_selectability", ""},
+    {"KHR_node_visibility", ""},
+    {"KHR_texture_basisu",
+        "is not decoded: such textures are drawn by their fallbacks, or plain; gltf-transform "
+        "ktxdecompress makes PNG of them"},
+    {"KHR_texture_transform", ""},
+    {"KHR_xmp_json_ld", ""},
+    {"MSFT_lod", "is drawn in its finest level only"},
+    {"MSFT_texture_dds", "is not decoded: such textures are drawn by their fallbacks, or plain"},
 };
 
-/* Used without being required, these change nothing that we draw. */
-static const char *const harmless[] = {
-    "EXT_mesh_manifold",
-    "KHR_animation_pointer",
-    "KHR_draco_mesh_compression", /* the uncompressed accessors are used */
-    "KHR_texture_basisu",         /* the fallback image is used */
-    "KHR_xmp_json_ld",
-};
-
-static bool among(const char *const *names, size_t count, const char *name)
+/* The row's number, or -1. */
+static int find(const char *name)
 {
-    for (size_t i = 0; i < count; i++)
-        if (!strcmp(names[i], name))
-            return true;
-    return false;
+    for (size_t i = 0; i < sizeof known / sizeof *known; i++)
+        if (!strcmp(known[i].name, name))
+            return (int)i;
+    return -1;
 }
 
-#define AMONG(names, name) among(names, sizeof names / sizeof *names, name)
+/* Not drawn though known; the row goes when its time comes. */
+static bool must_be_refused(const char *name)
+{
+    return find(name) < 0 || !strcmp(name, "KHR_draco_mesh_compression");
+}
 
 bool imp_extensions_check(const cJSON *root, struct psc_builder *builder, struct pen_error *error)
 {
     const cJSON *item;
     cJSON_ArrayForEach(item, cJSON_GetObjectItemCaseSensitive(root, "extensionsRequired"))
     {
-        if (!AMONG(supported, item->valuestring))
+        if (must_be_refused(item->valuestring))
             return pen_fail(error, PEN_INVALID, "/extensionsRequired",
-                "The glTF requires the extension %s, which is not supported.",
+                "The glTF requires the extension %s, which cannot be drawn here. Export it without "
+                "this extension, or convert it, for example with gltf-transform or Blender.",
                 imp_text(item->valuestring).s);
     }
     int warned = 0;
     cJSON_ArrayForEach(item, cJSON_GetObjectItemCaseSensitive(root, "extensionsUsed"))
     {
         const char *name = item->valuestring;
-        if (!AMONG(supported, name) && !AMONG(harmless, name) && warned++ < 16)
-            psc_builder_add_warning(
-                builder, "The extension %s is not supported and is ignored.", imp_text(name).s);
+        int row = find(name);
+        if (row >= 0 && !known[row].missing[0])
+            continue;
+        if (warned++ < 24)
+            psc_builder_add_warning(builder, "The extension %s %s.", imp_text(name).s,
+                row < 0 ? "is not supported and is ignored" : known[row].missing);
     }
     return true;
 }

@@ -3,6 +3,7 @@
 #include "renderer/import/document/gltf_tiny.h"
 #include "renderer/import/base/budget.h"
 #include "renderer/import/base/text.h"
+#include <algorithm>
 #include <cstring>
 #include <deque>
 #include <tiny_gltf.h>
@@ -187,6 +188,9 @@ gltf_node convert(const tinygltf::Node &from, Owner &owner)
         to.instance_rotation = integer(attributes, "ROTATION", -1);
         to.instance_scale = integer(attributes, "SCALE", -1);
     }
+    if (const tinygltf::Value *shown = find(from.extensions, "KHR_node_visibility"))
+        to.hidden = shown->Has("visible") && shown->Get("visible").IsBool() &&
+                    !shown->Get("visible").Get<bool>();
     to.first_child = static_cast<uint32_t>(owner.children.size());
     to.child_count = static_cast<uint32_t>(from.children.size());
     owner.children.insert(owner.children.end(), from.children.begin(), from.children.end());
@@ -203,6 +207,23 @@ const char *alpha_mode(const std::string &mode)
     return "";
 }
 
+/* KHR_materials_ior and KHR_materials_specular: the reflectance at normal incidence, compared with
+ * the 0.04 of index 1.5. An index of 0 stands for one that is infinite. */
+void dielectric(const tinygltf::Material &from, float *factor)
+{
+    double reflectance = 0.04, strength = 1;
+    if (const tinygltf::Value *index = find(from.extensions, "KHR_materials_ior")) {
+        double n = number(*index, "ior", 1.5);
+        reflectance = n > 0 ? (n - 1) * (n - 1) / ((n + 1) * (n + 1)) : 1;
+    }
+    if (const tinygltf::Value *specular = find(from.extensions, "KHR_materials_specular")) {
+        strength = number(*specular, "specularFactor", 1);
+        numbers(*specular, "specularColorFactor", factor, 3);
+    }
+    for (int i = 0; i < 3; i++)
+        factor[i] = static_cast<float>(std::min(reflectance * factor[i], 1.0) * strength / 0.04);
+}
+
 gltf_material convert(const tinygltf::Material &from)
 {
     gltf_material to = {};
@@ -215,6 +236,7 @@ gltf_material convert(const tinygltf::Material &from)
     to.metallic = static_cast<float>(pbr.metallicFactor);
     to.roughness = static_cast<float>(pbr.roughnessFactor);
     to.specular[0] = to.specular[1] = to.specular[2] = to.glossiness = 1;
+    dielectric(from, to.specular);
     to.normal_scale = static_cast<float>(from.normalTexture.scale);
     to.occlusion_strength = static_cast<float>(from.occlusionTexture.strength);
     to.alpha_cutoff = static_cast<float>(from.alphaCutoff);
@@ -231,6 +253,8 @@ gltf_material convert(const tinygltf::Material &from)
     if (const tinygltf::Value *old = find(from.extensions, "KHR_materials_pbrSpecularGlossiness")) {
         to.specular_glossiness = true;
         for (float &c : to.base_color)
+            c = 1;
+        for (float &c : to.specular)
             c = 1;
         numbers(*old, "diffuseFactor", to.base_color, 4);
         numbers(*old, "specularFactor", to.specular, 3);

@@ -41,6 +41,7 @@ struct gltf_node {
     int32_t mesh, camera, light, area_light, skin;
     int32_t instance_translation, instance_rotation, instance_scale; /* accessors */
     bool instanced;                                                  /* EXT_mesh_gpu_instancing */
+    bool hidden;                                                     /* KHR_node_visibility */
     uint32_t first_child, child_count;
     const char *name;
 };
@@ -53,7 +54,7 @@ struct gltf_texture_info {
 
 struct gltf_material {
     float base_color[4], emissive[3], emissive_strength, metallic, roughness;
-    float specular[3], glossiness;
+    float specular[3], glossiness; /* F0; else as a multiple of what 1.5 has as index */
     float normal_scale, occlusion_strength, alpha_cutoff;
     const char *alpha_mode; /* a literal: "OPAQUE", "MASK", "BLEND" or "" */
     bool double_sided, unlit, specular_glossiness;

@@ -27,7 +27,7 @@ const struct schema_array schema_arrays[SCHEMA_ARRAYS] = {
 
 SCHEMA(asset, {"version", STRING, .required = true}, {"minVersion", STRING});
 
-SCHEMA(buffer, {"byteLength", UINT, .required = true, .min = 1}, {"uri", STRING});
+SCHEMA(buffer, {"byteLength", UINT, .required = true}, {"uri", STRING});
 
 SCHEMA(meshopt,
     {"buffer", INDEX, .required = true, .into = IN_BUFFERS},
@@ -41,8 +41,8 @@ SCHEMA(view_extensions, OBJ("EXT_meshopt_compression", meshopt));
 SCHEMA(view,
     {"buffer", INDEX, .required = true, .into = IN_BUFFERS},
     {"byteOffset", UINT},
-    {"byteLength", UINT, .required = true, .min = 1},
-    {"byteStride", UINT, .min = 4, .max = 252},
+    {"byteLength", UINT, .required = true},
+    {"byteStride", UINT},
     OBJ("extensions", view_extensions));
 
 SCHEMA(sparse_indices,
@@ -61,7 +61,7 @@ SCHEMA(accessor,
     {"byteOffset", UINT},
     {"componentType", UINT, .required = true, .min = 5120, .max = 5126},
     {"normalized", BOOL},
-    {"count", UINT, .required = true, .min = 1},
+    {"count", UINT, .required = true},
     {"type", STRING, .required = true},
     OBJ("sparse", sparse));
 
@@ -76,7 +76,9 @@ SCHEMA(mesh, {"primitives", OBJECTS, .required = true, .schema = &primitive});
 SCHEMA(light_use, {"light", INDEX, .required = true, .into = IN_LIGHTS});
 SCHEMA(area_light_use, {"light", INDEX, .required = true, .into = IN_AREA_LIGHTS});
 SCHEMA(gpu_instancing, {"attributes", INDEX_MAP, .required = true, .into = IN_ACCESSORS});
+SCHEMA(node_visibility, {"visible", BOOL});
 SCHEMA(node_extensions,
+    OBJ("KHR_node_visibility", node_visibility),
     OBJ("KHR_lights_punctual", light_use),
     OBJ("EXT_lights_area", area_light_use),
     OBJ("EXT_mesh_gpu_instancing", gpu_instancing));
@@ -118,7 +120,11 @@ SCHEMA(specular_glossiness,
     OBJ("specularGlossinessTexture", texture_info));
 SCHEMA(emissive_strength, {"emissiveStrength", NUMBER});
 SCHEMA(unlit, {"name", STRING}); /* empty; but C has no empty arrays */
+SCHEMA(ior, {"ior", NUMBER});
+SCHEMA(specular, {"specularFactor", NUMBER}, {"specularColorFactor", NUMBERS, .max = 3});
 SCHEMA(material_extensions,
+    OBJ("KHR_materials_ior", ior),
+    OBJ("KHR_materials_specular", specular),
     OBJ("KHR_materials_unlit", unlit),
     OBJ("KHR_materials_pbrSpecularGlossiness", specular_glossiness),
     OBJ("KHR_materials_emissive_strength", emissive_strength));

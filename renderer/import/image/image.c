@@ -33,6 +33,24 @@ const char *imp_image_mime(enum imp_image_kind kind)
     return "";
 }
 
+/* What bytes that we do not decode are, as far as their first ones say. */
+static const char *foreign(struct imp_bytes data)
+{
+    static const struct {
+        const char *name, *magic;
+        size_t at, bytes;
+    } kinds[] = {{"KTX2 (Basis)", "\xabKTX 20\xbb", 0, 8}, {"KTX", "\xabKTX 11\xbb", 0, 8},
+        {"DDS", "DDS ", 0, 4}, {"AVIF", "ftypavif", 4, 8}, {"GIF", "GIF8", 0, 4},
+        {"BMP", "BM", 0, 2}, {"TIFF", "II*", 0, 4}, {"TIFF", "MM\0*", 0, 4},
+        {"Photoshop's", "8BPS", 0, 4}, {"OpenEXR", "v/1\1", 0, 4}, {"HDR", "#?", 0, 2},
+        {"JPEG XL", "\xff\x0a", 0, 2}, {"SVG", "<svg", 0, 4}};
+    for (size_t i = 0; i < sizeof kinds / sizeof *kinds; i++)
+        if (data.bytes >= kinds[i].at + kinds[i].bytes &&
+            !memcmp(data.data + kinds[i].at, kinds[i].magic, kinds[i].bytes))
+            return kinds[i].name;
+    return data.bytes ? "of an unknown kind" : "empty";
+}
+
 bool imp_image_header(
     struct imp_bytes data, uint32_t *width, uint32_t *height, struct pen_error *error)
 {
@@ -48,7 +66,8 @@ bool imp_image_header(
         read = imp_webp_header(data, width, height);
         break;
     case IMP_UNKNOWN_IMAGE:
-        return pen_fail(error, PEN_UNKNOWN_TYPE, "", "The image is neither PNG nor JPEG nor WebP.");
+        return pen_fail(error, PEN_UNKNOWN_TYPE, "",
+            "The image is %s, but neither PNG nor JPEG nor WebP.", foreign(data));
     }
     if (!read || !*width || !*height)
         return pen_fail(error, PEN_INVALID, "", "The image's header is damaged.");

@@ -64,7 +64,8 @@ void main()
 #else
     Material m = materials[v_material];
     vec3 emission = m.emissive.rgb;
-    float metallic = m.surface.x, roughness = m.surface.y, occlusion = 1.0, specular = 0.5;
+    float metallic = m.surface.x, roughness = m.surface.y, occlusion = 1.0;
+    float specular = min(0.5 * max(m.specular.r, max(m.specular.g, m.specular.b)), 1.0);
     vec3 f0 = m.specular.rgb;
     float glossiness = m.specular.a;
 #ifdef TEXTURED

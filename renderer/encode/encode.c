@@ -108,7 +108,9 @@ static bool encode_integers(const struct pen_frame *frame, const struct pen_outp
     file->sample = bits_of(output) == 16 ? PIXELS_U16 : PIXELS_U8;
     file->channels = source.total = source.channels[0] = channels;
     source.stored[0] = file->sample;
-    return oiio_write(file, fill_rows, &source, bytes, error);
+    bool written = oiio_write(file, fill_rows, &source, bytes, error);
+    file->compression = NULL; /* it ends here */
+    return written;
 }
 
 static bool is_sound(const struct pen_frame *frame, const struct pen_output *output)

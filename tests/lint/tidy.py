@@ -33,6 +33,8 @@ def main():
         return lines or ([name + ": " + result.stderr] if result.returncode else [])
 
     names = [n for n in sources(build) if not parts or any(p in n for p in parts)]
+    if not names:
+        tree.finish(["%s builds none of these sources" % build])
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         found = sorted({line for lines in pool.map(check, names) for line in lines})
     print("%d sources" % len(names))

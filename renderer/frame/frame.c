@@ -124,7 +124,7 @@ static bool record_face(
     const struct frame_job *job = f->job;
     struct light_face *face = &f->lights[light].faces[number];
     struct technique_ctx *ctx = job->ctx;
-    glm_mat4_mul(face->world_to_light, f->view.clip_to_world, face->clip_to_light);
+    glm_mat4_mul((vec4 *)face->world_to_light, f->view.clip_to_world, (vec4 *)face->clip_to_light);
     gl.NamedBufferData(ctx->light_block, sizeof *face, face, GL_STREAM_DRAW);
     gl.BindBufferBase(GL_UNIFORM_BUFFER, UBO_LIGHT, ctx->light_block);
     gl.BindBufferBase(GL_UNIFORM_BUFFER, UBO_PARAMS, ctx->param_block);

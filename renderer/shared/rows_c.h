@@ -106,7 +106,7 @@
         typedef struct tag real;                                                                   \
         typedef struct tag##_by_rule rule;                                                         \
         enum { stride = stride_rule };                                                             \
-        _Static_assert(sizeof(real) == sizeof(rule) && stride, "size of " #tag);
+        _Static_assert(sizeof(real) == sizeof(rule) && stride > 0, "size of " #tag);
 #define UNIFORM_BLOCK(tag, Name, binding) SHARED_CHECK(tag, 16)
 #define STORAGE_BLOCK(tag, Name, binding, access) SHARED_CHECK(tag, 4)
 #define END_BLOCK(instance) }

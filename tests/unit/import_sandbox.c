@@ -71,8 +71,9 @@ static bool work_goes_on(void)
 {
     char *p = malloc(1 << 20);
     memset(p, 1, 1 << 20);
-    p = realloc(p, 8 << 20);
-    return p[100] == 1 && write(writable, "x", 1) == 1 && lseek(writable, 0, SEEK_CUR) == 1;
+    char *more = realloc(p, 8 << 20);
+    return more && more[100] == 1 && write(writable, "x", 1) == 1 &&
+           lseek(writable, 0, SEEK_CUR) == 1;
 }
 
 static bool file_size_is_limited(void)

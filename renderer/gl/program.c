@@ -184,11 +184,6 @@ static bool assemble(
     append(out, "#version 450 core\n");
     if (!expand(&e, "bindings.def", error))
         return false;
-#define LOCATION(name, number) "#define LOCATION_" #name " " #number "\n"
-    append(out,
-#include "renderer/gl/locations.def"
-    );
-#undef LOCATION
     if (desc->defines)
         append(out, desc->defines);
     if (desc->info)

@@ -36,12 +36,6 @@ GLuint gl_programs_get(
 void gl_programs_end_frame(struct gl_programs *programs);
 struct pen_program_counts gl_programs_counts(const struct gl_programs *programs);
 
-#define LOCATION(name, number) LOCATION_##name = number,
-enum gl_location {
-#include "renderer/gl/locations.def"
-};
-#undef LOCATION
-
 /* The file with its includes replaced, as programs have it, for code that compiles pieces of its
  * own; free() it. NULL: see gl_programs_get. */
 char *gl_program_text(const char *file, struct pen_error *error);

@@ -2,7 +2,7 @@
  *
  * vis, RGBA16F: rgb = mean over the light's area of emission x visibility; a = mean visibility
  * (1 = lit). A new method is one .c in renderer/techniques/, its .glsl, and a line in
- * registry.def. */
+ * registry.def. The words that its .glsl may use: renderer/shaders/README.md. */
 #pragma once
 #include "protocol/result.h"
 #include "protocol/technique_info.h"

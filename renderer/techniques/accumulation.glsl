@@ -1,7 +1,7 @@
 // Aszodi and Szirmay-Kalos 2006: every map texel is a small caster whose shadow on the emitter is
-// added up. Mode paper takes K x K points as printed (with c_z < r_z added and the sum divided by the
-// light's area), clipped clips the texels' rectangles against the emitter. LAYERED, with more than one
-// layer, the sum becomes the paper's occlusion bits.
+// added up. Mode paper takes K x K points as printed (with c_z < r_z added and the sum divided by
+// the light's area), clipped clips the texels' rectangles against the emitter. LAYERED, with more
+// than one layer, the sum becomes the paper's occlusion bits.
 #define PATCHES_APART
 #include "caster_patches.glsl"
 #include "emitter_area.glsl"

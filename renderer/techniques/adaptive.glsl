@@ -1,6 +1,6 @@
 // Chun and Oh 2016: the filter window of a soft shadow maps onto the light without mirroring (F2),
-// so a part of the window tells which part of the light is seen. Where visibility and emission vary,
-// the window is split into quarters, at most twice: T = sum of area x visibility x emission.
+// so a part of the window tells which part of the light is seen. Where visibility and emission
+// vary, the window is split into quarters, at most twice: T = sum of area x visibility x emission.
 #include "receiver.glsl"
 #include "window.glsl"
 #include "taps.glsl"
@@ -75,7 +75,8 @@ vec4 visibility(Surface s)
     float nearest_z;
     vec2 extent = min_max_search_extent(r.q, s.p.z, r.metres, nearest_z);
     int kind = adaptive_window(r, extent);
-    float caster_z = adaptive_blocker_depth(r, extent, shift, kind == WINDOW_MIXED, nearest_z, s.p.z);
+    float caster_z =
+        adaptive_blocker_depth(r, extent, shift, kind == WINDOW_MIXED, nearest_z, s.p.z);
     extent = max(light_filter_extent(caster_z, s.p.z), P(min_filter) * r.metres);
     if (kind == WINDOW_MIXED)
         kind = adaptive_window(r, 1.5 * extent);
@@ -85,8 +86,8 @@ vec4 visibility(Surface s)
         float visible = estimate(r, vec2(0.0), extent, shift, 0);
         result = scalar_visibility(visible);
         // Quarters of a disk are no squares; only rectangles are textured.
-        float weight = light.shape == SHAPE_DISK ? 0.0
-                                                 : split_weight(visible, emission_moments(vec2(0.0), 0));
+        float weight =
+            light.shape == SHAPE_DISK ? 0.0 : split_weight(visible, emission_moments(vec2(0.0), 0));
         if (weight > 0.0) {
             depth = 1u;
             vec4 sum = vec4(0.0);

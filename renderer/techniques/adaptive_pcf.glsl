@@ -12,8 +12,8 @@ int adaptive_window(Receiver r, vec2 extent)
     return window_class(r.q, extent, r.plane, r.bias, 0.0, r.map_size);
 }
 
-// Four times the taps where the first ones find nothing although the pyramid cannot prove the window
-// lit: at the outer edge of a penumbra blockers fill a small part of it.
+// Four times the taps where the first ones find nothing although the pyramid cannot prove the
+// window lit: at the outer edge of a penumbra blockers fill a small part of it.
 float adaptive_blocker_depth(
     Receiver r, vec2 extent, vec2 shift, bool wanted, float nearest_z, float receiver_z)
 {

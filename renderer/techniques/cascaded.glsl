@@ -11,7 +11,8 @@ float ramp(float d, float from, float to)
 }
 
 // Half extents on the map plane that one sample's kernel must cover to meet its neighbours': the
-// image of its part of the emitter, for the mean depth of what blocks (F3). Negative: nothing blocks.
+// image of its part of the emitter, for the mean depth of what blocks (F3). Negative: nothing
+// blocks.
 vec2 kernel_extent(SampledReceiver r, vec2 size, vec2 q)
 {
     float nearest_z, sum = 0.0, blockers = 0.0;
@@ -36,8 +37,8 @@ vec2 kernel_extent(SampledReceiver r, vec2 size, vec2 q)
 }
 
 // kernel^2 taps over +- extent around the sample's view of the receiver, at least +- a texel. The
-// samples shift their taps against each other, so that straight edges get kernel * side * side levels;
-// where that is few (not MANY_LEVELS), each comparison is interpolated too.
+// samples shift their taps against each other, so that straight edges get kernel * side * side
+// levels; where that is few (not MANY_LEVELS), each comparison is interpolated too.
 float lit_bridged(vec2 size, SampleMap map, SampledReceiver r, SampleView v, vec2 extent, int i)
 {
     int kernel = cascade.count.y, side = cascade.count.z;
@@ -61,7 +62,7 @@ vec4 visibility(Surface s)
 {
     float view_z = view.forward.w / s.depth;
     float share = ramp(view_z, cascade.fade.x, cascade.fade.y) *
-        (1.0 - ramp(view_z, cascade.fade.z, cascade.fade.w));
+                  (1.0 - ramp(view_z, cascade.fade.z, cascade.fade.w));
     if (share <= 0.0)
         discard;
     vec2 size = vec2(textureSize(maps, 0).xy), q = light_project(s.p), extent = vec2(0.0);

@@ -19,8 +19,8 @@ float edge_within(ivec2 pixel, float radius)
             texelFetch(edge_pyramid, ivec2(a.x, b.y), level).x));
 }
 
-// Mean W of the edges around, by a tent of 3 x 3 filtered taps: the pyramid's maxima would show their
-// blocks.
+// Mean W of the edges around, by a tent of 3 x 3 filtered taps: the pyramid's maxima would show
+// their blocks.
 float edge_mean(ivec2 pixel, float radius)
 {
     float lod = max(log2(radius) - 0.6, 0.0);

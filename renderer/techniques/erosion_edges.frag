@@ -15,7 +15,7 @@ layout(location = 0) out vec2 edge;
 float lit_at(ivec2 at)
 {
     return texelFetch(hard_map, clamp(at, ivec2(0), ivec2(view.viewport.xy) - 1), 0).x == 1.0 ? 1.0
-                                                                                            : 0.0;
+                                                                                              : 0.0;
 }
 
 void main()

@@ -1,9 +1,9 @@
 // The hard shadow buffer of Klein et al. 2014: (lit, W of the blocker, bound of W, reach). W is the
-// window scale of erosion_window.glsl, which stands for blocker and receiver depth in one and is the
-// same in all faces of a cube; it is negative where the silhouette test of variant direct fails.
-// Bound: no blocker of this receiver has a larger W; 0 where everything blocks. Reach: pixels that
-// W = 1 makes of the light's half extent, at most. What is proved to be lit is left as the target starts:
-// (1, 0, 0, 0).
+// window scale of erosion_window.glsl, which stands for blocker and receiver depth in one and is
+// the same in all faces of a cube; it is negative where the silhouette test of variant direct
+// fails. Bound: no blocker of this receiver has a larger W; 0 where everything blocks. Reach:
+// pixels that W = 1 makes of the light's half extent, at most. What is proved to be lit is left as
+// the target starts: (1, 0, 0, 0).
 #include "penumbra.glsl"
 #include "erosion_window.glsl"
 #include "blocker_window.glsl"
@@ -22,8 +22,8 @@ vec4 visibility(Surface s)
     bool silhouette = true;
     if (P(variant) == VARIANT_DIRECT) {
         // An edge of the shadow belongs to a silhouette when the 3 x 3 Laplacian finds it in the
-        // shadow map too, a pixel of the receiver's own plane to each side; where an object in front
-        // merely ends, all of them are blocked.
+        // shadow map too, a pixel of the receiver's own plane to each side; where an object in
+        // front merely ends, all of them are blocked.
         mat2 map = inverse(pixels);
         silhouette = false;
         for (int i = 0; i < 4; i++) {

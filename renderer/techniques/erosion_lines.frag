@@ -7,8 +7,8 @@ layout(binding = UNIT_EDGES) uniform sampler2D edges;
 layout(location = 0) out vec4 line;
 
 // Sums of weight, position and outer products of the boundary points of the edge pixel at `offset`.
-void add_pixel(vec2 edge, vec2 offset, float weight, inout vec3 first, inout vec3 second,
-    inout vec2 outward)
+void add_pixel(
+    vec2 edge, vec2 offset, float weight, inout vec3 first, inout vec3 second, inout vec2 outward)
 {
     uint bits = uint(edge.x);
     for (uint k = 0u; k < 4u; k++) {
@@ -39,8 +39,8 @@ void main()
             vec3 f = vec3(0.0), s = vec3(0.0);
             add_pixel(edge, offset, exp(falloff * dot(offset, offset)), f, s, side);
             // The far side of a thin shadow and edges of other casters are other lines.
-            bool same = dot(side, own_side) > 0.0 && abs(edge.y - own.y) < 0.25 * own.y &&
-                at != pixel;
+            bool same =
+                dot(side, own_side) > 0.0 && abs(edge.y - own.y) < 0.25 * own.y && at != pixel;
             first += same ? f : vec3(0.0);
             second += same ? s : vec3(0.0);
             outward += same ? side : vec2(0.0);

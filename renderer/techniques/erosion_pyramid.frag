@@ -1,5 +1,5 @@
-// One level of the edge pyramid: the largest W (0: no edge), and the means of edges and of their W. A
-// level of odd side drops nothing: the last texel of a row also takes the leftover column.
+// One level of the edge pyramid: the largest W (0: no edge), and the means of edges and of their W.
+// A level of odd side drops nothing: the last texel of a row also takes the leftover column.
 #include "level.def"
 layout(binding = UNIT_SOURCE) uniform sampler2D source;
 layout(location = 0) out vec4 edge;

@@ -1,6 +1,6 @@
-// Averages each fitted line with those of the same edge farther along it: where a nearly upright edge
-// steps aside by a pixel, a short fit takes the step for a slope, and under a rectangular light the
-// width of the penumbra depends on that. Needs P(fit_radius).
+// Averages each fitted line with those of the same edge farther along it: where a nearly upright
+// edge steps aside by a pixel, a short fit takes the step for a slope, and under a rectangular
+// light the width of the penumbra depends on that. Needs P(fit_radius).
 #include "view.glsl"
 #include "erosion.def"
 layout(binding = UNIT_LINES) uniform sampler2D lines;
@@ -20,7 +20,7 @@ void main()
             vec2 offset = vec2(at - pixel), on = offset + other.z * other.xy;
             // The same edge runs on in about the same direction and within a pixel or so.
             bool same = other.w > 0.0 && abs(other.w - line.w) < 0.25 * line.w &&
-                dot(other.xy, line.xy) > 0.85 && abs(dot(on, line.xy) - line.z) < 1.5;
+                        dot(other.xy, line.xy) > 0.85 && abs(dot(on, line.xy) - line.z) < 1.5;
             float w = same ? exp(falloff * dot(offset, offset)) : 0.0;
             normal += w * other.xy;
             point += w * on;

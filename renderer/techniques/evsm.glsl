@@ -1,6 +1,7 @@
-// Lauritzen's EVSM4: Chebyshev's bound on depth warped by a convex and by a concave exponential. The
-// mean of a warped slope is not below the warp of its centre in the convex one; in the concave one
-// it is by a factor of cosh(c r) at most, r being half the slope's depth range, ln cosh x <= x^2 / 2.
+// Lauritzen's EVSM4: Chebyshev's bound on depth warped by a convex and by a concave exponential.
+// The mean of a warped slope is not below the warp of its centre in the convex one; in the concave
+// one it is by a factor of cosh(c r) at most, r being half the slope's depth range, ln cosh x <=
+// x^2 / 2.
 #include "moment_lookup.glsl"
 
 vec4 visibility(Surface s)

@@ -4,7 +4,9 @@
 vec4 visibility(Surface s)
 {
     MomentLookup l = moment_lookup(s);
-    float share = P(moment_bias) > 0.0 ? P(moment_bias) : P(precision) == PRECISION_UNORM16 ? 6e-5 : 6e-7;
+    float share = P(moment_bias) > 0.0                ? P(moment_bias)
+                  : P(precision) == PRECISION_UNORM16 ? 6e-5
+                                                      : 6e-7;
     vec4 b = moments_bias(moments_unpack(l.m), share);
     // A lit slope spreads over [lowest, highest] but has its centre as the mean: only when the mean
     // is less does something block, and then the centre is the better depth to compare with.

@@ -19,9 +19,8 @@ vec4 visibility(Surface s)
             float d2 = dot(to, to), f = max(v.facing, 0.0);
             w = light_parallel ? f : f * s.p.z / (d2 * d2);
         }
-        sum += light.textured != 0
-            ? vec4(light_emission(map.at.zw, 0.0) * w * lit, w)
-            : vec4(w * lit, 0.0, 0.0, w);
+        sum += light.textured != 0 ? vec4(light_emission(map.at.zw, 0.0) * w * lit, w)
+                                   : vec4(w * lit, 0.0, 0.0, w);
     }
     return sum * lookup.weight.x;
 }

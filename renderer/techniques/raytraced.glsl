@@ -1,6 +1,6 @@
 #include "horizon.glsl"
 #include "raytraced.def"
-layout(binding = UNIT_TRACED) uniform sampler2D traced;         // rgb: mean of e V, a: mean of V
+layout(binding = UNIT_TRACED) uniform sampler2D traced; // rgb: mean of e V, a: mean of V
 layout(binding = UNIT_TRACED_ERROR) uniform sampler2D standard_error; // of a
 
 // VARIANCE: instead, the square of the standard error of a.

@@ -12,7 +12,7 @@ struct Receiver {
     vec2 q;
     ReceiverPlane plane;
     HorizonBack back;
-    vec2 bias;   // in unit depth and in hardware depth
+    vec2 bias; // in unit depth and in hardware depth
     vec3 p, n;
     float light; // 1 where window positions stand for points of the emitter (F2), 0 in the search
 };
@@ -23,10 +23,9 @@ struct Share {
     float blocker_depth; // blocked times mean unit depth of the blockers
 };
 
-// One square of the quadtree: low, high in texels of the table. `exact`: corners count by the part of
-// the texel, else whole texels do. False when it has to be split.
-bool evaluate(
-    vec2 low, vec2 high, bool exact, int level, vec2 shift, Receiver r, out Share share)
+// One square of the quadtree: low, high in texels of the table. `exact`: corners count by the part
+// of the texel, else whole texels do. False when it has to be split.
+bool evaluate(vec2 low, vec2 high, bool exact, int level, vec2 shift, Receiver r, out Share share)
 {
     vec2 texel = sat_texel();
     if (!exact) {
@@ -66,7 +65,8 @@ bool evaluate(
         }
         // Mean and variance place all blockers at one depth; when that is not where the nearest
         // ones are, there are no two planes here.
-        float ratio = (m.y - 2.0 * t.mean * m.x + t.mean * t.mean) / max(d * (t.mean - range.x), 1e-12);
+        float ratio =
+            (m.y - 2.0 * t.mean * m.x + t.mean * t.mean) / max(d * (t.mean - range.x), 1e-12);
         bool two_planes = abs(ratio - 1.0) < P(tolerance);
         ok = lit || (r.back.depth < 0.0 && (blocked || (!planar && two_planes)));
         share.blocker_depth = clamp(
@@ -75,8 +75,8 @@ bool evaluate(
     return ok;
 }
 
-// The same by depth comparisons on a grid. Points of the emitter below the receiver's horizon are left
-// out. `extent`: of the whole window.
+// The same by depth comparisons on a grid. Points of the emitter below the receiver's horizon are
+// left out. `extent`: of the whole window.
 Share compare(vec2 low, vec2 high, vec2 shift, vec2 extent, Receiver r)
 {
     Share share = Share(0.0, 0.0, 0.0);
@@ -148,10 +148,10 @@ vec4 visibility(Surface s)
 {
     vec2 q = light_project(s.p), texel = sat_texel(), least = P(min_filter) * texel;
     vec2 widest = 0.5 * sat_info.window * texel;
-    vec2 bias = P(bias) * s.p.z *
-        vec2(1.0 / (light.far_z - light.near_z), light_depth_slope(s.p.z));
-    Receiver r = Receiver(
-        q, receiver_plane(s.p, s.n), horizon_back(s.p, s.n, bias.y), bias, s.p, s.n, 0.0);
+    vec2 bias =
+        P(bias) * s.p.z * vec2(1.0 / (light.far_z - light.near_z), light_depth_slope(s.p.z));
+    Receiver r =
+        Receiver(q, receiver_plane(s.p, s.n), horizon_back(s.p, s.n, bias.y), bias, s.p, s.n, 0.0);
     // The square as large as the disk.
     float shape = light.shape == SHAPE_DISK ? 0.88622693 : 1.0;
     vec2 extent;

@@ -1,4 +1,4 @@
-"""clang-format has nothing to change in any C or C++ file. Exit 77 when it is not installed.
+"""clang-format has nothing to change in any C, C++ or GLSL file. Exit 77 when it is not installed.
 format.py --fix rewrites the files instead."""
 import shutil
 import subprocess
@@ -11,7 +11,7 @@ def main():
     if not shutil.which("clang-format"):
         print("clang-format is not installed")
         sys.exit(77)
-    names = [name for name in tree.files() if name.endswith((".c", ".h", ".cpp"))]
+    names = [name for name in tree.files() if name.endswith((".c", ".h", ".cpp") + tree.GLSL)]
     if sys.argv[1:] == ["--fix"]:
         subprocess.run(["clang-format", "-i", "-style=file"] + names, cwd=tree.ROOT, check=True)
         return

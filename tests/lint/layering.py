@@ -123,7 +123,7 @@ def main():
         if not name.endswith((".c", ".h", ".cpp")):
             continue
         for number, text in enumerate(tree.read(name).splitlines(), 1):
-            found = re.match(r'\s*#\s*include\s*([<"])([^>"]+)[>"]', text)
+            found = re.match(r'\s*#\s*(?:include|define SHARED_ROWS)\s*([<"])([^>"]+)[>"]', text)
             if not found:
                 continue
             if found[2] == "microhttpd.h" and not name.startswith("tests/"):

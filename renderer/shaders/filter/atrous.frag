@@ -28,11 +28,16 @@ void main()
             ivec2 offset = ivec2(x, y) * level.step.x, at = pixel + offset;
             float inside = all(equal(at, clamp(at, ivec2(0), last))) ? 1.0 : 0.0;
             at = clamp(at, ivec2(0), last);
-            vec2 d = vec2(float(offset.x) - spread.z * float(offset.y), float(offset.y)) / deviation;
-            vec2 spline = vec2(x == 0 ? 0.375 : abs(x) == 1 ? 0.25 : 0.0625,
-                y == 0 ? 0.375 : abs(y) == 1 ? 0.25 : 0.0625);
+            vec2 d =
+                vec2(float(offset.x) - spread.z * float(offset.y), float(offset.y)) / deviation;
+            vec2 spline = vec2(x == 0        ? 0.375
+                               : abs(x) == 1 ? 0.25
+                                             : 0.0625,
+                y == 0        ? 0.375
+                : abs(y) == 1 ? 0.25
+                              : 0.0625);
             float w = inside * spline.x * spline.y *
-                exp(-0.5 * dot(d, d) - surface_difference(plane, at, offset));
+                      exp(-0.5 * dot(d, d) - surface_difference(plane, at, offset));
             sum += w * ratio_at(at);
             total += w;
         }

@@ -1,5 +1,5 @@
-// One of 16 phases per pixel, each once in every 4 x 4 block and neighbours far apart (Bayer's order).
-// Irrational steps move all of them from one jittered frame to the next.
+// One of 16 phases per pixel, each once in every 4 x 4 block and neighbours far apart (Bayer's
+// order). Irrational steps move all of them from one jittered frame to the next.
 #include "sequences.glsl"
 
 int dither_order(ivec2 pixel)

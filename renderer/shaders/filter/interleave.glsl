@@ -34,8 +34,9 @@ vec4 visibility(Surface s)
 {
     float widest;
     vec4 center = load(s.pixel, widest);
-    vec2 g = vec2(gradient(depth_at(s.pixel - ivec2(1, 0)), s.depth, depth_at(s.pixel + ivec2(1, 0))),
-        gradient(depth_at(s.pixel - ivec2(0, 1)), s.depth, depth_at(s.pixel + ivec2(0, 1))));
+    vec2 g =
+        vec2(gradient(depth_at(s.pixel - ivec2(1, 0)), s.depth, depth_at(s.pixel + ivec2(1, 0))),
+            gradient(depth_at(s.pixel - ivec2(0, 1)), s.depth, depth_at(s.pixel + ivec2(0, 1))));
     vec4 sum = vec4(0.0);
     float weight = 0.0, width;
     ivec2 last = ivec2(view.viewport.xy) - 1;

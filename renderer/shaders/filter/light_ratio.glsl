@@ -1,7 +1,7 @@
-// What screen-space filters carry per pixel: light that arrives over light that would arrive without
-// casters, as sums that are divided after filtering (the ratio estimator of Heitz et al. 2018), so
-// that filtering neither needs nor changes the light's own colour. Targets start as a lit pixel: 1
-// and 1.
+// What screen-space filters carry per pixel: light that arrives over light that would arrive
+// without casters, as sums that are divided after filtering (the ratio estimator of Heitz et al.
+// 2018), so that filtering neither needs nor changes the light's own colour. Targets start as a lit
+// pixel: 1 and 1.
 //   plain light:       ratio_lit.r arrived, ratio_lit.g of
 //   TEXTURED:          ratio_lit rgb and a (mean) arrived, ratio_all rgb and a of
 //   FROM_HARD:         the hard visibility of penumbra_estimate.glsl
@@ -74,8 +74,8 @@ void ratio_write(ivec2 pixel, RATIO r)
 #if defined(LAST) && defined(TEXTURED)
     float mean = clamp(r[0].a / max(r[1].a, 1e-6), 0.0, 1.0);
     // A colour that none of the samples emits has no ratio of its own.
-    vec3 share = mix(vec3(mean), clamp(r[0].rgb / max(r[1].rgb, 1e-6), 0.0, 1.0),
-        step(1e-3 * r[1].a, r[1].rgb));
+    vec3 share = mix(
+        vec3(mean), clamp(r[0].rgb / max(r[1].rgb, 1e-6), 0.0, 1.0), step(1e-3 * r[1].a, r[1].rgb));
     vis = ratio_fade(pixel, r[1].a) * vec4(light.emission_mean.rgb * share, mean);
 #elif defined(LAST)
     float mean = clamp(r.x / max(r.y, 1e-6), 0.0, 1.0);

@@ -48,7 +48,8 @@ vec4 visibility(Surface s)
     // The maps in order of x fall into as many strata as a pixel takes samples. Pixels of a 4 x 4
     // block divide each stratum among themselves; from stratum to stratum a pixel moves on, since
     // the maps' y repeats in each.
-    float stratum = float(batch.range.z) / float(P(samples)), phase = dither(s.pixel, view.display.z);
+    float stratum = float(batch.range.z) / float(P(samples)),
+          phase = dither(s.pixel, view.display.z);
     int first = int(float(batch.range.y) / stratum);
     int end = min(int(ceil(float(batch.range.y + batch.range.x) / stratum)), int(P(samples)));
 #else
@@ -57,8 +58,8 @@ vec4 visibility(Surface s)
     vec4 sum = vec4(0.0);
     for (int k = first; k < end; k++) {
 #ifdef SPARSE
-        int number = min(int((float(k) + fract(phase + float(k) / stratum)) * stratum),
-            batch.range.z - 1);
+        int number =
+            min(int((float(k) + fract(phase + float(k) / stratum)) * stratum), batch.range.z - 1);
         int i = number - batch.range.y;
         if (i < 0 || i >= batch.range.x)
             continue;
@@ -67,8 +68,8 @@ vec4 visibility(Surface s)
 #endif
         vec2 seen = look_up(s, i, depth, bias);
         sum += light.textured != 0
-            ? vec4(light_emission(batch.samples[i].at.zw, batch.cell.x), 1.0) * seen.y
-            : vec4(seen.yx, 0.0, 0.0);
+                   ? vec4(light_emission(batch.samples[i].at.zw, batch.cell.x), 1.0) * seen.y
+                   : vec4(seen.yx, 0.0, 0.0);
     }
     return sum * batch.cell.y;
 }

@@ -1,5 +1,6 @@
 // The penumbra of a receiver in pixels. A blocker's depth gives the light's image on the map plane
-// (F3); the receiver's own plane carries it over to the screen, whatever its tilt to camera or light.
+// (F3); the receiver's own plane carries it over to the screen, whatever its tilt to camera or
+// light.
 
 // Columns: change of the pixel position per metre along x and y of the map plane, on the surface.
 mat2 pixels_per_map(Surface s)
@@ -35,4 +36,3 @@ vec3 screen_spread(mat2 pixels, vec2 sigma, float most)
     float skew = yy > 1e-12 ? clamp(xy / yy, -1000.0, 1000.0) : 0.0;
     return vec3(sqrt(max(xx - skew * xy, 0.0) * shrink), skew, sqrt(yy * shrink));
 }
-

@@ -18,11 +18,11 @@ vec4 visibility(Surface s)
     HorizonBack back = horizon_back(s.p, s.n, bias);
     // The comparison says nothing of a receiver that turns its back to the light's centre.
     int count = back.depth > 0.0 ? int(P(search_taps)) : 0;
-    float turned = light_pcf(s, plane, back, light_uv(q), search.extent, bias, count,
-        int(P(search_taps)), vec2(0.5));
+    float turned = light_pcf(
+        s, plane, back, light_uv(q), search.extent, bias, count, int(P(search_taps)), vec2(0.5));
     float hard = hard_lit(s, plane, q, texel, bias, depth) ? 1.0 : 0.0;
-    vec3 spread = screen_spread(
-        pixels_per_map(s), light_gauss_deviation * extent, light_gauss_deviation * float(P(max_radius)));
+    vec3 spread = screen_spread(pixels_per_map(s), light_gauss_deviation * extent,
+        light_gauss_deviation * float(P(max_radius)));
     // All zeros are left to receivers that no part of the light can reach.
     return vec4(back.depth > 0.0 ? turned : hard, spread.xy, max(spread.z, 1e-3));
 }

@@ -1,4 +1,5 @@
-// The fade of horizon.glsl for passes that have no Surface; needs surface_plane.glsl and light.glsl.
+// The fade of horizon.glsl for passes that have no Surface; needs surface_plane.glsl and
+// light.glsl.
 #include "horizon.glsl"
 
 float pixel_horizon_fade(ivec2 pixel)

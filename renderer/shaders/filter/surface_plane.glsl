@@ -19,8 +19,8 @@ Plane plane_at(ivec2 pixel)
     // Reversed infinite depth is linear over the screen on a plane.
     vec4 h = vec4(plane.normal, -dot(plane.normal, world)) * view.clip_to_world;
     vec2 most = vec2(0.2 * plane.depth);
-    plane.gradient = clamp(-h.xy * vec2(2.0, -2.0) * view.viewport.zw /
-            (abs(h.z) > 1e-20 ? h.z : 1e-20), -most, most);
+    plane.gradient = clamp(
+        -h.xy * vec2(2.0, -2.0) * view.viewport.zw / (abs(h.z) > 1e-20 ? h.z : 1e-20), -most, most);
     return plane;
 }
 
@@ -29,5 +29,5 @@ float plane_distance(Plane plane, ivec2 at, ivec2 offset)
 {
     float depth = texelFetch(g_depth, at, 0).r;
     return (depth - plane.depth - dot(plane.gradient, vec2(offset))) /
-        (P(depth_sigma) * plane.depth);
+           (P(depth_sigma) * plane.depth);
 }

@@ -1,6 +1,6 @@
-// Counts, per pixel, the lights and frames in which the classifier proved it lit (x) or in umbra (y):
-// of a cube's faces, the one that owns the whole tile. The background sees every light. TILES: the
-// method was classified.
+// Counts, per pixel, the lights and frames in which the classifier proved it lit (x) or in umbra
+// (y): of a cube's faces, the one that owns the whole tile. The background sees every light. TILES:
+// the method was classified.
 #include "classes.def"
 layout(binding = UNIT_DEPTH) uniform sampler2D g_depth;
 layout(binding = UNIT_TILES) uniform sampler2D tile_classes; // class / 255

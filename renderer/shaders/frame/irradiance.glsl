@@ -1,8 +1,8 @@
 // Irradiance at p (normal n) of emitters of unit radiance, all in world space, in closed form.
 
-// Angle over sine of an edge whose ends have this cosine, for angles up to 90 degrees: least-squares
-// polynomial, error 1.6e-4 of the factor, and exact relative to 2e-4 for lights of any size since it
-// multiplies every edge.
+// Angle over sine of an edge whose ends have this cosine, for angles up to 90 degrees:
+// least-squares polynomial, error 1.6e-4 of the factor, and exact relative to 2e-4 for lights of
+// any size since it multiplies every edge.
 float angle_over_sine_acute(float x)
 {
     return 1.5706395 + x * (-0.9914837 + x * (0.7078825 + x * (-0.3954492 + x * 0.1085248)));
@@ -34,18 +34,18 @@ float clipped_edge(vec3 a, vec3 b, float da, float db, vec3 n, inout vec3 leave,
     return max(da, db) < 0.0 ? 0.0 : e;
 }
 
-// Most receivers see the whole rectangle above their horizon and its edges under less than 90 degrees.
-// Opposite edges then share their plane's normal, all dot products are linear in the corner's signs,
-// and Lambert's formula needs four roots. The rest goes edge by edge: software rasterisers run the
-// first round of a loop, like both sides of a branch, for all pixels, but no more than that where none
-// needs it. The fifth edge closes the cut along the horizon.
+// Most receivers see the whole rectangle above their horizon and its edges under less than 90
+// degrees. Opposite edges then share their plane's normal, all dot products are linear in the
+// corner's signs, and Lambert's formula needs four roots. The rest goes edge by edge: software
+// rasterisers run the first round of a loop, like both sides of a branch, for all pixels, but no
+// more than that where none needs it. The fifth edge closes the cut along the horizon.
 float irradiance_rect(vec3 p, vec3 n, vec3 center, vec3 half_x, vec3 half_y)
 {
     vec3 to = center - p, nx = cross(half_x, n), ny = cross(half_y, n);
     vec2 size2 = vec2(dot(half_x, half_x), dot(half_y, half_y));
     vec4 length2 = dot(to, to) + size2.x + size2.y +
-        2.0 * dot(to, half_x) * vec4(-1.0, 1.0, 1.0, -1.0) +
-        2.0 * dot(to, half_y) * vec4(-1.0, -1.0, 1.0, 1.0); // of corners a, b, c, d
+                   2.0 * dot(to, half_x) * vec4(-1.0, 1.0, 1.0, -1.0) +
+                   2.0 * dot(to, half_y) * vec4(-1.0, -1.0, 1.0, 1.0); // of corners a, b, c, d
     vec4 inverse = inversesqrt(max(length2, 1e-30));
     // Cosines of the edges ab, bc, cd, da, times both lengths.
     vec4 products = 0.5 * (length2 + length2.yzwx) - 2.0 * size2.xyxy;

@@ -1,7 +1,7 @@
-// How much of the sky a surface sees past what is near it on the screen: horizons along slices through
-// the depth buffer, the arc between them integrated in closed form (Jimenez et al. 2016, practical
-// real-time strategies for accurate indirect occlusion). Half the picture's resolution; the slices turn
-// in a 4 x 4 pattern that occlusion_blur.frag averages away.
+// How much of the sky a surface sees past what is near it on the screen: horizons along slices
+// through the depth buffer, the arc between them integrated in closed form (Jimenez et al. 2016,
+// practical real-time strategies for accurate indirect occlusion). Half the picture's resolution;
+// the slices turn in a 4 x 4 pattern that occlusion_blur.frag averages away.
 #include "view.glsl"
 #include "octahedral.glsl"
 #include "occlusion.def"
@@ -34,8 +34,8 @@ void main()
     if (depth == 0.0)
         return;
     vec3 forward = view.forward.xyz;
-    vec3 right = normalize(cross(forward,
-        vec3(view.world_to_clip[0].y, view.world_to_clip[1].y, view.world_to_clip[2].y)));
+    vec3 right = normalize(cross(
+        forward, vec3(view.world_to_clip[0].y, view.world_to_clip[1].y, view.world_to_clip[2].y)));
     vec3 up = cross(right, forward);
     vec3 world = octahedral_decode(texelFetch(g_normal, pixel, 0).xy);
     vec3 n = vec3(dot(world, right), dot(world, up), dot(world, forward));
@@ -71,7 +71,8 @@ void main()
         }
         vec2 horizon = vec2(1.0, -1.0) * acos(clamp(highest, -1.0, 1.0));
         horizon = turned + clamp(horizon - turned, -1.57079633, 1.57079633);
-        sum += share * (arc(horizon.x, turned, cos_n, sin_n) + arc(horizon.y, turned, cos_n, sin_n));
+        sum +=
+            share * (arc(horizon.x, turned, cos_n, sin_n) + arc(horizon.y, turned, cos_n, sin_n));
     }
     open = clamp(sum / float(SLICES), 0.0, 1.0);
 }

@@ -8,7 +8,8 @@ layout(location = 0) out float open;
 
 void main()
 {
-    ivec2 at = ivec2(gl_FragCoord.xy), size = ivec2(view.viewport.xy), last = textureSize(noisy, 0) - 1;
+    ivec2 at = ivec2(gl_FragCoord.xy), size = ivec2(view.viewport.xy),
+          last = textureSize(noisy, 0) - 1;
     float depth = texelFetch(g_depth, min(2 * at + 1, size - 1), 0).r;
     float sum = 0.0, weight = 0.0;
     for (int i = 0; i < 16; i++) {

@@ -1,6 +1,6 @@
 // Direct light of all lights times their visibility, plus ambient and emission. RESOLVE: there is
-// one frame only, so the display curve is applied here. LIGHTS is a constant: unrolled, each light's
-// uniforms are read once for all pixels instead of gathered per pixel.
+// one frame only, so the display curve is applied here. LIGHTS is a constant: unrolled, each
+// light's uniforms are read once for all pixels instead of gathered per pixel.
 #include "view.glsl"
 #include "octahedral.glsl"
 #include "irradiance.glsl"
@@ -23,13 +23,13 @@ layout(binding = UNIT_SKY_OPEN) uniform sampler2D sky_open; // half size
 
 layout(location = 0) out vec4 color;
 
-struct Material {
+struct Reflectance {
     vec3 diffuse, f0;
     float alpha; // squared roughness
 };
 
-// GGX with height-correlated Smith visibility and Schlick's Fresnel term, as glTF 2.0 appendix B, times
-// nl; out of the cosines alone, since |v + l|^2 = 2 + 2 vl. `a` is the squared roughness.
+// GGX with height-correlated Smith visibility and Schlick's Fresnel term, as glTF 2.0 appendix B,
+// times nl; out of the cosines alone, since |v + l|^2 = 2 + 2 vl. `a` is the squared roughness.
 vec3 specular_brdf(vec3 f0, float a, float nv, float nl, float vl)
 {
     float h = inversesqrt(max(2.0 + 2.0 * vl, 1e-6));
@@ -41,11 +41,11 @@ vec3 specular_brdf(vec3 f0, float a, float nv, float nl, float vl)
 }
 
 #if defined(HAS_RECT) || defined(HAS_ROUND)
-// Quadrature of the specular part over the emitter, k x k cells. Scenes without glossy materials get
-// by with four. All that a point u of the emitter needs is linear in u, or quadratic without the mixed
-// term, so nothing but scalars is left inside the loop. It has a constant length: a dynamic one costs
-// software rasterisers more than the samples it saves.
-vec3 specular_area(Material m, ShadeLight s, vec3 p, vec3 n, vec3 v)
+// Quadrature of the specular part over the emitter, k x k cells. Scenes without glossy materials
+// get by with four. All that a point u of the emitter needs is linear in u, or quadratic without
+// the mixed term, so nothing but scalars is left inside the loop. It has a constant length: a
+// dynamic one costs software rasterisers more than the samples it saves.
+vec3 specular_area(Reflectance m, ShadeLight s, vec3 p, vec3 n, vec3 v)
 {
     int type = int(s.origin.w);
 #ifdef GLOSSY
@@ -63,7 +63,8 @@ vec3 specular_area(Material m, ShadeLight s, vec3 p, vec3 n, vec3 v)
     }
 #endif
     vec2 size2 = vec2(dot(half_x, half_x), dot(half_y, half_y));
-    float cell = (type == PEN_LIGHT_RECT ? 4.0 : 3.14159265) * sqrt(size2.x * size2.y) / float(k * k);
+    float cell =
+        (type == PEN_LIGHT_RECT ? 4.0 : 3.14159265) * sqrt(size2.x * size2.y) / float(k * k);
     // The lobe is widened by the solid angle that one cell stands for.
     float to2 = dot(to, to), a = m.alpha + min(0.25 * sqrt(cell / to2), 0.5);
     float nv = max(dot(n, v), 1e-3), facing = max(-dot(axis, to), 0.0);
@@ -89,7 +90,7 @@ vec3 specular_area(Material m, ShadeLight s, vec3 p, vec3 n, vec3 v)
     return sum * (facing * cell);
 }
 
-vec3 reflected_area(Material m, ShadeLight s, vec3 p, vec3 n, vec3 v)
+vec3 reflected_area(Reflectance m, ShadeLight s, vec3 p, vec3 n, vec3 v)
 {
     int type = int(s.origin.w);
     float e = 0.0;
@@ -111,7 +112,7 @@ vec3 reflected_area(Material m, ShadeLight s, vec3 p, vec3 n, vec3 v)
 #endif
 
 #ifdef HAS_PUNCTUAL
-vec3 reflected_punctual(Material m, ShadeLight s, vec3 p, vec3 n, vec3 v)
+vec3 reflected_punctual(Reflectance m, ShadeLight s, vec3 p, vec3 n, vec3 v)
 {
     int type = int(s.origin.w);
     vec3 to = s.origin.xyz - p;
@@ -123,14 +124,16 @@ vec3 reflected_punctual(Material m, ShadeLight s, vec3 p, vec3 n, vec3 v)
     if (type == PEN_LIGHT_SPOT)
         e *= pow(clamp((dot(-l, s.z.xyz) - s.z.w) / max(s.half_y.w - s.z.w, 1e-4), 0.0, 1.0), 2.0);
     float nv = max(dot(n, v), 1e-3);
-    return (m.diffuse * (1.0 / 3.14159265) + specular_brdf(m.f0, m.alpha, nv, nl, dot(v, l)) / nl) * e;
+    return (m.diffuse * (1.0 / 3.14159265) + specular_brdf(m.f0, m.alpha, nv, nl, dot(v, l)) / nl) *
+           e;
 }
 #endif
 
-vec3 reflected(Material m, ShadeLight s, vec3 p, vec3 n, vec3 v)
+vec3 reflected(Reflectance m, ShadeLight s, vec3 p, vec3 n, vec3 v)
 {
 #if (defined(HAS_RECT) || defined(HAS_ROUND)) && defined(HAS_PUNCTUAL)
-    return int(s.origin.w) >= PEN_LIGHT_SUN ? reflected_punctual(m, s, p, n, v) : reflected_area(m, s, p, n, v);
+    return int(s.origin.w) >= PEN_LIGHT_SUN ? reflected_punctual(m, s, p, n, v)
+                                            : reflected_area(m, s, p, n, v);
 #elif defined(HAS_PUNCTUAL)
     return reflected_punctual(m, s, p, n, v);
 #elif defined(HAS_RECT) || defined(HAS_ROUND)
@@ -144,7 +147,8 @@ vec3 reflected(Material m, ShadeLight s, vec3 p, vec3 n, vec3 v)
 // How much of the sky the pixel sees: of the four half-size texels around it, those at its depth.
 float open_to_sky(ivec2 pixel, float depth)
 {
-    ivec2 last = textureSize(sky_open, 0) - 1, base = (pixel - 1) >> 1, size = ivec2(view.viewport.xy);
+    ivec2 last = textureSize(sky_open, 0) - 1, base = (pixel - 1) >> 1,
+          size = ivec2(view.viewport.xy);
     float sum = 0.0, weight = 0.0;
     for (int i = 0; i < 4; i++) {
         ivec2 q = clamp(base + ivec2(i & 1, i >> 1), ivec2(0), last);
@@ -156,7 +160,7 @@ float open_to_sky(ivec2 pixel, float depth)
     return sum / weight;
 }
 
-vec3 sky_reflected(Material m, vec3 n, vec3 v, float open)
+vec3 sky_reflected(Reflectance m, vec3 n, vec3 v, float open)
 {
     float nv = clamp(dot(n, v), 1e-3, 1.0);
     // Light that bounces between bright surfaces fills their corners (Jimenez et al. 2016, 4).
@@ -165,9 +169,8 @@ vec3 sky_reflected(Material m, vec3 n, vec3 v, float open)
     vec3 seen = max(vec3(open), ((open * a + b) * open + c) * open);
     // A narrow lobe is hidden less gradually than a hemisphere (Lagarde and de Rousiers 2014).
     float hidden = clamp(pow(nv + open, exp2(-16.0 * sqrt(m.alpha) - 1.0)) - 1.0 + open, 0.0, 1.0);
-    return m.diffuse * sky_diffuse(n) * seen +
-        sky_reflectance(m.f0, sqrt(m.alpha), nv) * sky_specular(reflect(-v, n), m.alpha) *
-        hidden;
+    return m.diffuse * sky_diffuse(n) * seen + sky_reflectance(m.f0, sqrt(m.alpha), nv) *
+                                                   sky_specular(reflect(-v, n), m.alpha) * hidden;
 }
 #endif
 
@@ -182,7 +185,7 @@ void main()
     vec4 albedo = texelFetch(g_albedo, pixel, 0);
     vec4 surface = texelFetch(g_surface, pixel, 0);
     albedo.rgb *= albedo.rgb;
-    Material m;
+    Reflectance m;
     m.diffuse = albedo.rgb * (1.0 - surface.g) * (1.0 - 0.08 * surface.a);
     m.f0 = mix(vec3(0.08 * surface.a), albedo.rgb, surface.g);
     m.alpha = max(surface.r * surface.r, 0.002);

@@ -1,14 +1,16 @@
-// A photographer's studio around the scene, in closed form: a gradient that is quadratic in the height
-// of the direction, and soft boxes (spherical Gaussians) that metals and lacquer show. All of it scales
-// with shade.sky_level, which follows the radiance that the lights give to what they reach.
+// A photographer's studio around the scene, in closed form: a gradient that is quadratic in the
+// height of the direction, and soft boxes (spherical Gaussians) that metals and lacquer show. All
+// of it scales with shade.sky_level, which follows the radiance that the lights give to what they
+// reach.
 const float sky_sharpness[SKY_BOXES] = float[](9.0, 26.0);
 
 // Mean over the cosine-weighted hemisphere around n. The factors of the zonal bands are Ramamoorthi
 // and Hanrahan's (2001): 1, 2/3 and 1/4. A soft box adds its flux times its cosine.
 vec3 sky_diffuse(vec3 n)
 {
-    float e = shade.sky_gradient.x + shade.sky_gradient.z / 3.0 + (2.0 / 3.0) * shade.sky_gradient.y * n.y +
-        0.25 * shade.sky_gradient.z * (n.y * n.y - 1.0 / 3.0);
+    float e = shade.sky_gradient.x + shade.sky_gradient.z / 3.0 +
+              (2.0 / 3.0) * shade.sky_gradient.y * n.y +
+              0.25 * shade.sky_gradient.z * (n.y * n.y - 1.0 / 3.0);
     for (int i = 0; i < SKY_BOXES; i++) {
         float cosine = 0.5 + 0.5 * dot(n, shade.sky_box[i].xyz);
         e += shade.sky_box[i].w * (2.0 / sky_sharpness[i]) * cosine * cosine;
@@ -16,22 +18,23 @@ vec3 sky_diffuse(vec3 n)
     return vec3(max(e, 0.0) * shade.sky_level.x);
 }
 
-// What is mirrored is brighter than what lights: a studio's walls are lit for metals to show, and kept
-// off the rest.
+// What is mirrored is brighter than what lights: a studio's walls are lit for metals to show, and
+// kept off the rest.
 const float sky_mirrored = 2.0;
 
-// Mean over the lobe of a surface of squared roughness a around its mirror direction r. The lobe is a
-// spherical Gaussian of this sharpness (Wang et al. 2009), and the product of two is one again.
+// Mean over the lobe of a surface of squared roughness a around its mirror direction r. The lobe is
+// a spherical Gaussian of this sharpness (Wang et al. 2009), and the product of two is one again.
 vec3 sky_specular(vec3 r, float a)
 {
     float lobe = 0.5 / (a * a + 1e-4), narrow = lobe / (1.0 + lobe);
-    float e = shade.sky_gradient.x + shade.sky_gradient.z / 3.0 + narrow * shade.sky_gradient.y * r.y +
-        narrow * narrow * narrow * shade.sky_gradient.z * (r.y * r.y - 1.0 / 3.0);
+    float e = shade.sky_gradient.x + shade.sky_gradient.z / 3.0 +
+              narrow * shade.sky_gradient.y * r.y +
+              narrow * narrow * narrow * shade.sky_gradient.z * (r.y * r.y - 1.0 / 3.0);
     e *= sky_mirrored;
     for (int i = 0; i < SKY_BOXES; i++) {
         float share = lobe / (lobe + sky_sharpness[i]);
         e += shade.sky_box[i].w * share *
-            exp(sky_sharpness[i] * share * (dot(r, shade.sky_box[i].xyz) - 1.0));
+             exp(sky_sharpness[i] * share * (dot(r, shade.sky_box[i].xyz) - 1.0));
     }
     return vec3(max(e, 0.0) * shade.sky_level.x);
 }

@@ -12,8 +12,8 @@ in vec4 v_uv;
 in vec4 v_color;
 flat in uint v_material;
 
-layout(location = 0) out vec4 out_normal;  // geometric, shading
-layout(location = 1) out vec4 out_albedo;  // square root of albedo; a: 1 a lit surface, 0 the ground
+layout(location = 0) out vec4 out_normal; // geometric, shading
+layout(location = 1) out vec4 out_albedo; // square root of albedo; a: 1 a lit surface, 0 the ground
 layout(location = 2) out vec4 out_surface; // roughness, metallic, occlusion, F0 / 0.08
 #ifdef EMIT
 layout(location = 3) out vec3 out_emission;
@@ -29,7 +29,8 @@ float solve_metallic(float diffuse, float specular)
     float one_minus = 1.0 - specular;
     float b = diffuse * one_minus / (1.0 - dielectric) + specular - 2.0 * dielectric;
     float c = dielectric - specular;
-    return clamp((-b + sqrt(max(b * b - 4.0 * dielectric * c, 0.0))) / (2.0 * dielectric), 0.0, 1.0);
+    return clamp(
+        (-b + sqrt(max(b * b - 4.0 * dielectric * c, 0.0))) / (2.0 * dielectric), 0.0, 1.0);
 }
 
 float brightness(vec3 c)
@@ -49,8 +50,9 @@ void main()
         shading = geometric;
     if (dot(shading, geometric) < 0.0)
         shading = -shading;
-    // Derivatives of single-precision positions are good to about 1e-3; where the vertex normal says
-    // the same (a flat face) it is the more exact one, and receiver planes need that at grazing light.
+    // Derivatives of single-precision positions are good to about 1e-3; where the vertex normal
+    // says the same (a flat face) it is the more exact one, and receiver planes need that at
+    // grazing light.
     if (dot(shading, geometric) > 0.99998)
         geometric = shading;
 #ifdef GROUND
@@ -81,8 +83,10 @@ void main()
         glossiness *= t.a;
     }
     if (material_has(v_material, SCENE_UNIT_OCCLUSION))
-        occlusion = 1.0 + m.surface.z *
-            (material_sample(occlusion_map, v_material, SCENE_UNIT_OCCLUSION, v_uv).r - 1.0);
+        occlusion =
+            1.0 +
+            m.surface.z *
+                (material_sample(occlusion_map, v_material, SCENE_UNIT_OCCLUSION, v_uv).r - 1.0);
     if (material_has(v_material, SCENE_UNIT_EMISSION))
         emission *= material_sample(emission_map, v_material, SCENE_UNIT_EMISSION, v_uv).rgb;
     if (material_has(v_material, SCENE_UNIT_NORMAL) && dot(v_tangent.xyz, v_tangent.xyz) > 0.0) {
@@ -100,7 +104,7 @@ void main()
     vec3 albedo = base.rgb;
     if ((m.flags.y & PSC_SPECULAR_GLOSSINESS) != 0u) {
         float strongest = max(f0.r, max(f0.g, f0.b));
-        metallic = solve_metallic(brightness(albedo) , brightness(f0));
+        metallic = solve_metallic(brightness(albedo), brightness(f0));
         vec3 from_diffuse = albedo * (1.0 - strongest) / (0.96 * max(1.0 - metallic, 1e-4));
         vec3 from_specular = (f0 - 0.04 * (1.0 - metallic)) / max(metallic, 1e-4);
         albedo = clamp(mix(from_diffuse, from_specular, metallic * metallic), 0.0, 1.0);

@@ -50,7 +50,7 @@ void main()
     v_normal = vec3(dot(cross(row1.xyz, row2.xyz), normal.xyz),
         dot(cross(row2.xyz, row0.xyz), normal.xyz), dot(cross(row0.xyz, row1.xyz), normal.xyz));
     v_normal *= (dot(row0.xyz, cross(row1.xyz, row2.xyz)) < 0.0 ? -1.0 : 1.0) *
-        inversesqrt(max(dot(v_normal, v_normal), 1e-36));
+                inversesqrt(max(dot(v_normal, v_normal), 1e-36));
     v_tangent = vec4(dot(row0.xyz, tangent.xyz), dot(row1.xyz, tangent.xyz),
         dot(row2.xyz, tangent.xyz), tangent.w);
 #endif

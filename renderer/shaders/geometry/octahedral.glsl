@@ -1,5 +1,6 @@
-// Unit vectors as points of an octahedron's net (Meyer et al. 2010, Cigolle et al. 2014), in [0, 1]^2
-// so that they fit 16-bit unorm targets: half floats are ten times too coarse for receiver planes.
+// Unit vectors as points of an octahedron's net (Meyer et al. 2010, Cigolle et al. 2014), in [0,
+// 1]^2 so that they fit 16-bit unorm targets: half floats are ten times too coarse for receiver
+// planes.
 vec2 octahedral_encode(vec3 n)
 {
     n /= abs(n.x) + abs(n.y) + abs(n.z);

@@ -1,4 +1,5 @@
-// Integral of emission over rectangles of the emitter, divided by its area (passes/light/emission_sat.h).
+// Integral of emission over rectangles of the emitter, divided by its area
+// (passes/light/emission_sat.h).
 layout(binding = UNIT_EMISSION_SUMS) uniform sampler2D emission_sums;
 
 vec3 emission_below(vec2 corner)
@@ -10,5 +11,5 @@ vec3 emission_below(vec2 corner)
 vec3 emission_inside(vec2 low, vec2 high)
 {
     return emission_below(high) - emission_below(vec2(low.x, high.y)) -
-        emission_below(vec2(high.x, low.y)) + emission_below(low);
+           emission_below(vec2(high.x, low.y)) + emission_below(low);
 }

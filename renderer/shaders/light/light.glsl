@@ -42,8 +42,8 @@ float light_depth(float z)
 float light_linear(float d)
 {
     return light_parallel
-        ? mix(light.near_z, light.far_z, d)
-        : light.near_z * light.far_z / (light.far_z - d * (light.far_z - light.near_z));
+               ? mix(light.near_z, light.far_z, d)
+               : light.near_z * light.far_z / (light.far_z - d * (light.far_z - light.near_z));
 }
 
 // Change of hardware depth per metre along z, at z.
@@ -57,7 +57,7 @@ float light_depth_slope(float z)
 float light_window_scale(float caster_z, float receiver_z)
 {
     return light_parallel ? receiver_z - caster_z
-                               : light.near_z * (receiver_z - caster_z) / (receiver_z * caster_z);
+                          : light.near_z * (receiver_z - caster_z) / (receiver_z * caster_z);
 }
 
 // F3, F4: half extents on the map plane of the filter region and of the blocker search.
@@ -91,8 +91,8 @@ ReceiverPlane receiver_plane(vec3 p, vec3 n)
         plane.gradient = n.z < 0.0 ? -n.xy / (min(n.z, -0.02) * range) : vec2(0.0);
     } else {
         float np = dot(n, p);
-        plane.gradient = np < 0.0
-            ? -light.far_z / range * n.xy / min(np, -0.02 * length(p)) : vec2(0.0);
+        plane.gradient =
+            np < 0.0 ? -light.far_z / range * n.xy / min(np, -0.02 * length(p)) : vec2(0.0);
     }
     return plane;
 }

@@ -1,5 +1,5 @@
-// Occlusion bits of the emitter's points (passes/light/light_bits.h). LIGHT_BITS, an expression, is 64
-// or 256; patches that overlap set the same bits, so casters behind one another count once.
+// Occlusion bits of the emitter's points (passes/light/light_bits.h). LIGHT_BITS, an expression, is
+// 64 or 256; patches that overlap set the same bits, so casters behind one another count once.
 #include "patches.def"
 // (step, 2 pattern + axis, 128 bits)
 layout(binding = UNIT_LIGHT_BITS) uniform usampler2DArray bits_below;
@@ -22,9 +22,9 @@ void bits_add(vec2 low, vec2 high)
     int row = 2 * bit_pattern;
     for (int i = 0; i < BIT_LAYERS; i++)
         hidden_bits[i] |= texelFetch(bits_below, ivec3(at.z, row, i), 0) &
-            ~texelFetch(bits_below, ivec3(at.x, row, i), 0) &
-            texelFetch(bits_below, ivec3(at.w, row + 1, i), 0) &
-            ~texelFetch(bits_below, ivec3(at.y, row + 1, i), 0);
+                          ~texelFetch(bits_below, ivec3(at.x, row, i), 0) &
+                          texelFetch(bits_below, ivec3(at.w, row + 1, i), 0) &
+                          ~texelFetch(bits_below, ivec3(at.y, row + 1, i), 0);
 }
 
 float bits_lit_share()

@@ -62,8 +62,8 @@ float sample_plane(SampledReceiver r, SampleView v, vec2 offset)
 }
 
 // The texel under v.l + offset: its depth, and the receiver's plane at its centre.
-vec2 sample_depths(sampler2DArray maps, vec2 size, SampleMap map, SampledReceiver r, SampleView v,
-    vec2 offset)
+vec2 sample_depths(
+    sampler2DArray maps, vec2 size, SampleMap map, SampledReceiver r, SampleView v, vec2 offset)
 {
     vec2 uv = (v.l + offset) * map.window.xy + map.window.zw, texel = uv * size;
     vec2 center = offset + (floor(texel) + 0.5 - texel) / (size * map.window.xy);
@@ -77,8 +77,8 @@ float sample_lit(sampler2DArray maps, vec2 size, SampleMap map, SampledReceiver 
 }
 
 // The comparison interpolated between the four texels around v.l + offset.
-float sample_lit_bilinear(sampler2DArray maps, vec2 size, SampleMap map, SampledReceiver r,
-    SampleView v, vec2 offset)
+float sample_lit_bilinear(
+    sampler2DArray maps, vec2 size, SampleMap map, SampledReceiver r, SampleView v, vec2 offset)
 {
     vec2 texel = ((v.l + offset) * map.window.xy + map.window.zw) * size - 0.5;
     vec2 base = floor(texel), f = texel - base, metres = 1.0 / (size * map.window.xy);
@@ -90,11 +90,12 @@ float sample_lit_bilinear(sampler2DArray maps, vec2 size, SampleMap map, Sampled
     return mix(mix(lit.w, lit.z, f.x), mix(lit.x, lit.y, f.x), f.y);
 }
 
-// Mean of the comparison over a square of kernel - 1 texels around v.l, which kernel^2 texels cover:
-// those at the border count for the part inside. 2 is bilinear filtering, 1 a single texel; which of
-// the three it is, KERNEL_SINGLE, KERNEL_BILINEAR or neither, is the pass's (sample_map_kernel).
-float sample_lit_box(sampler2DArray maps, vec2 size, SampleMap map, SampledReceiver r, SampleView v,
-    int kernel)
+// Mean of the comparison over a square of kernel - 1 texels around v.l, which kernel^2 texels
+// cover: those at the border count for the part inside. 2 is bilinear filtering, 1 a single texel;
+// which of the three it is, KERNEL_SINGLE, KERNEL_BILINEAR or neither, is the pass's
+// (sample_map_kernel).
+float sample_lit_box(
+    sampler2DArray maps, vec2 size, SampleMap map, SampledReceiver r, SampleView v, int kernel)
 {
 #if defined(KERNEL_SINGLE)
     return sample_lit(maps, size, map, r, v);

@@ -16,7 +16,6 @@ BlockerSearch blocker_window(Surface s, ReceiverPlane plane, vec2 q, vec2 least,
     // Past the far plane of the map lies nothing but empty texels, at the far plane's depth.
     search.lit = search.nearest_z >= min(s.p.z, 0.9995 * light.far_z);
     float farthest = light_depth(min_max_window(q, search.extent).y);
-    search.dark =
-        farthest < min(plane.depth - dot(abs(plane.gradient), search.extent), 1.0) - bias;
+    search.dark = farthest < min(plane.depth - dot(abs(plane.gradient), search.extent), 1.0) - bias;
     return search;
 }

@@ -3,11 +3,11 @@
 #include "taps.glsl"
 #include "blocker_window.glsl"
 
-// Half extents on the map plane of the light's image by the average blocker; by the nearest when all
-// taps miss what the pyramid knows to be there. 0 where all of the light is hidden, so that there is
-// nothing to filter.
-vec2 blocker_extent(Surface s, ReceiverPlane plane, BlockerSearch search, vec2 uv, vec2 least,
-    float bias)
+// Half extents on the map plane of the light's image by the average blocker; by the nearest when
+// all taps miss what the pyramid knows to be there. 0 where all of the light is hidden, so that
+// there is nothing to filter.
+vec2 blocker_extent(
+    Surface s, ReceiverPlane plane, BlockerSearch search, vec2 uv, vec2 least, float bias)
 {
     vec2 inverse_size = 1.0 / (light.rect.zw - light.rect.xy);
     int count = search.lit || search.dark ? 0 : int(P(search_taps));

@@ -4,10 +4,11 @@
 //
 // The window comes from the bounds of depth in the pyramid, which is then walked as a quadtree: a
 // node without a caster or beside the light ends there, and one whose depths barely differ, or that
-// is smaller than 1 / P(kernel) of the light as seen past it, is a single caster. PATCHES_APART: the
-// method has no rows P(fill) and P(gap), and leaves gaps between casters alone.
+// is smaller than 1 / P(kernel) of the light as seen past it, is a single caster. PATCHES_APART:
+// the method has no rows P(fill) and P(gap), and leaves gaps between casters alone.
 #include "patches.def"
-layout(binding = UNIT_CASTERS) uniform sampler2DArray caster_maps; // hardware depth, nearest layer first
+// Hardware depth, nearest layer first.
+layout(binding = UNIT_CASTERS) uniform sampler2DArray caster_maps;
 #define MIN_MAX_LAYERED
 #include "min_max.glsl"
 #include "horizon.glsl"
@@ -21,18 +22,18 @@ const int LIT = 0, PENUMBRA = 1, UMBRA = 2;
 // positions divided by that range and the emitter, e = (l - q) / (range emitter), the emitter point
 // that l hides is e / (depth - d).
 struct PatchWindow {
-    int answer;      // LIT and UMBRA are proven: nothing is left to walk
-    vec2 q;          // the receiver on the map plane, m
-    vec2 reach;      // half extent of the window, m
-    vec2 origin;     // e of the map's corner
-    vec2 texel;      // e per texel
-    float depth;     // of the receiver
-    vec2 gradient;   // of the depth of its plane, per e
+    int answer;    // LIT and UMBRA are proven: nothing is left to walk
+    vec2 q;        // the receiver on the map plane, m
+    vec2 reach;    // half extent of the window, m
+    vec2 origin;   // e of the map's corner
+    vec2 texel;    // e per texel
+    float depth;   // of the receiver
+    vec2 gradient; // of the depth of its plane, per e
     float bias;
-    float above;     // share of the emitter above the receiver's horizon; patches hide of that
+    float above;      // share of the emitter above the receiver's horizon; patches hide of that
     HorizonBack back; // gradient per e
-    float widest;    // depth - d of the nearest caster: its shadow is as wide as the window
-    float narrowest; // the least that was met: of the sharpest shadow
+    float widest;     // depth - d of the nearest caster: its shadow is as wide as the window
+    float narrowest;  // the least that was met: of the sharpest shadow
 };
 
 PatchWindow patch_window(Surface s)
@@ -84,7 +85,8 @@ float filled_border(PatchWindow w, ivec2 neighbour, int layer, int level, float 
     neighbour = max(neighbour, ivec2(0));
     float its = level > 0 ? texelFetch(min_max_pyramid, ivec3(neighbour, layer), level - 1).r
                           : caster_depth(neighbour, layer);
-    // dz / z in hardware depth; a parallel light has no distance, so there it is a share of the range.
+    // dz / z in hardware depth; a parallel light has no distance, so there it is a share of the
+    // range.
     float scale = light_parallel ? 1.0 : light.far_z / (light.far_z - light.near_z) - d;
     bool near = its < limit && abs(its - d) < P(gap) * scale;
     float shared_border = border / max(w.depth - its, 1e-20);
@@ -114,7 +116,8 @@ void walk_quadtree(inout PatchWindow w, int layer, ivec2 root, int root_level)
         d = level > 0 ? d : vec3(middle);
         // Neighbours compute a common border alike, to the last bit: points must not fall between.
         vec2 low = w.origin + vec2(at << level) * w.texel;
-        vec2 high = w.origin + vec2((at + 1) << level) * w.texel, side = float(1 << level) * w.texel;
+        vec2 high = w.origin + vec2((at + 1) << level) * w.texel,
+             side = float(1 << level) * w.texel;
         float plane = min(w.depth + dot(w.gradient, low + 0.5 * side), 1.0);
         float back = back_depth(w.back, low + 0.5 * side);
         float slack = level > 0 ? 0.5 * dot(abs(w.gradient), side) : 0.0;
@@ -125,14 +128,14 @@ void walk_quadtree(inout PatchWindow w, int layer, ivec2 root, int root_level)
         bool whole = d.y < least && d.x > back + back_slack;
         // The receiver's own plane: depth is linear over the map, so the mean is the middle's.
         bool own = d.x >= plane - slack - w.bias && d.y <= plane + slack + w.bias &&
-            abs(d.z - plane) <= w.bias;
+                   abs(d.z - plane) <= w.bias;
         float widest = w.depth - d.x;
         bool beside = any(greaterThan(low, vec2(widest))) || any(lessThan(high, vec2(-widest)));
         bool open = d.x < most && d.y > back - back_slack && !own && !beside;
         // Fine enough for its own shadow: casters near the receiver need finer texels than the
         // nearest to the light does.
         bool leaf = level == 0 || max(side.x, side.y) * 0.5 * float(P(kernel)) <= widest ||
-            (whole && d.y - d.x <= 0.016 * (w.depth - d.y));
+                    (whole && d.y - d.x <= 0.016 * (w.depth - d.y));
         if (open && leaf) {
             // Part of a coarse texel: the near depth hides as much as makes the mean of the two
             // depths. Where the plane runs through the texel its middle decides.

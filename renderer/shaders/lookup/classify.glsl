@@ -1,4 +1,5 @@
-// Windows of the map in which nothing or everything blocks, found without looking at a single depth.
+// Windows of the map in which nothing or everything blocks, found without looking at a single
+// depth.
 #include "depth_unit.glsl"
 #include "min_max.glsl"
 
@@ -20,8 +21,8 @@ void classify_window(
     for (int y = a.y; y <= b.y; y++)
         for (int x = a.x; x <= b.x; x++) {
             vec2 range = texelFetch(min_max_pyramid, ivec2(x, y), level).rg;
-            PlaneInWindow t = plane_in_window(
-                plane, (vec2(x, y) + 0.5) * texel + origin, 0.5 * texel, bias);
+            PlaneInWindow t =
+                plane_in_window(plane, (vec2(x, y) + 0.5) * texel + origin, 0.5 * texel, bias);
             lit = lit && depth_unit_of_z(range.x) >= t.lowest;
             blocked = blocked && depth_unit_of_z(range.y) < t.lowest;
         }

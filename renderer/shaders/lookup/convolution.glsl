@@ -53,7 +53,7 @@ vec4 kernel_mean(usampler2DArray table, int layer, Kernel k)
         vec4 row = vec4(0.0);
         for (int i = 1; i < 4; i++)
             row += k.wx[i] *
-                vec4(texelFetch(table, ivec3(k.xs[i], k.ys[j], layer), 0) - base[i] - first);
+                   vec4(texelFetch(table, ivec3(k.xs[i], k.ys[j], layer), 0) - base[i] - first);
         sum += k.wy[j] * row;
     }
     return sum;
@@ -69,8 +69,7 @@ struct Kernel {
 Kernel kernel_of(vec2 low, vec2 high, vec2 map_size)
 {
     vec2 size = high - low;
-    return Kernel(
-        0.5 * (low + high) / map_size, log2(max(0.57735 * max(size.x, size.y), 1.0)));
+    return Kernel(0.5 * (low + high) / map_size, log2(max(0.57735 * max(size.x, size.y), 1.0)));
 }
 
 vec4 kernel_mean(sampler2DArray map, int layer, Kernel k)
@@ -118,15 +117,15 @@ float series_step(float x)
 
 Receiver series_receiver(Surface s)
 {
-    #ifdef TABLES
+#ifdef TABLES
     return receiver_of(s, vec2(textureSize(basis, 0).xy - 1));
 #else
     return receiver_of(s, vec2(textureSize(basis, 0).xy));
 #endif
 }
 
-// What is proven of the window q +- extent. Blocked only where the series says so too, past its step,
-// twice the offset before the receiver: else proven pixels stand out as spots.
+// What is proven of the window q +- extent. Blocked only where the series says so too, past its
+// step, twice the offset before the receiver: else proven pixels stand out as spots.
 int receiver_window(Receiver r, vec2 extent)
 {
     float margin = 2.0 * series.offset / series.range * (light.far_z - light.near_z);
@@ -138,8 +137,8 @@ int receiver_window(Receiver r, vec2 extent)
 // near blockers than it saves: errors on the bunny and the demo are least at about a quarter.
 float cell_depth(Receiver r, vec2 offset, vec2 extent)
 {
-    float d = r.plane.depth + dot(r.plane.gradient, offset) -
-        0.25 * dot(abs(r.plane.gradient), extent);
+    float d =
+        r.plane.depth + dot(r.plane.gradient, offset) - 0.25 * dot(abs(r.plane.gradient), extent);
     float z = light_linear(clamp(d - r.bias, 0.0, 1.0));
     return (z - light.near_z) / (light.far_z - light.near_z) * series.range;
 }
@@ -149,7 +148,8 @@ float cell_depth(Receiver r, vec2 offset, vec2 extent)
 vec3 cell_lookup(Receiver r, vec2 offset, vec2 extent, bool weighted, out float depth)
 {
     vec2 at = (r.q + offset - light.rect.xy) / r.metres, reach = extent / r.metres;
-    vec2 low = clamp(at - reach, vec2(0.0), r.map_size), high = clamp(at + reach, vec2(0.0), r.map_size);
+    vec2 low = clamp(at - reach, vec2(0.0), r.map_size),
+         high = clamp(at + reach, vec2(0.0), r.map_size);
     vec2 cover = reach.x > 0.0 && reach.y > 0.0 ? (high - low) / (2.0 * reach) : vec2(1.0);
     depth = cell_depth(r, offset, extent);
 #ifndef TABLES

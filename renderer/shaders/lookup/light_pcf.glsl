@@ -1,11 +1,11 @@
-// Percentage-closer filtering in which a tap stands for the point of the light that it can hide (F2):
-// those below the receiver's horizon are left out of the mean.
+// Percentage-closer filtering in which a tap stands for the point of the light that it can hide
+// (F2): those below the receiver's horizon are left out of the mean.
 #include "taps.glsl"
 #include "horizon.glsl"
 
 // Share that is lit of the part of the light above the horizon, out of `taps` comparisons over
-// q +- extent; 1 when `count`, which is `taps` or 0, is 0. `uv`: of q. The loop's bound is dynamic so
-// that software rasterisers skip it.
+// q +- extent; 1 when `count`, which is `taps` or 0, is 0. `uv`: of q. The loop's bound is dynamic
+// so that software rasterisers skip it.
 float light_pcf(Surface s, ReceiverPlane plane, HorizonBack back, vec2 uv, vec2 extent, float bias,
     int count, int taps, vec2 shift)
 {

@@ -40,7 +40,8 @@ vec2 min_max_window(vec2 q, vec2 extent)
     level = min(level, textureQueryLevels(min_max_pyramid) - 1);
     ivec2 last = max(textureSize(min_max_pyramid, 0).xy >> level, ivec2(1)) - 1;
     vec2 scale = size * exp2(-float(level));
-    ivec2 a = clamp(ivec2(low * scale), ivec2(0), last), b = clamp(ivec2(high * scale), ivec2(0), last);
+    ivec2 a = clamp(ivec2(low * scale), ivec2(0), last),
+          b = clamp(ivec2(high * scale), ivec2(0), last);
     vec2 v0 = min_max_at(a, level);
     vec2 v1 = min_max_at(ivec2(b.x, a.y), level);
     vec2 v2 = min_max_at(ivec2(a.x, b.y), level);

@@ -1,10 +1,10 @@
 // The receiver under a pixel as a shadow map sees it.
 struct Receiver {
-    vec2 q;             // where the map shows it, m on the map plane
+    vec2 q; // where the map shows it, m on the map plane
     ReceiverPlane plane;
-    float bias;         // hardware depth
-    vec2 map_size;      // texels
-    vec2 metres;        // per texel
+    float bias;    // hardware depth
+    vec2 map_size; // texels
+    vec2 metres;   // per texel
 };
 
 Receiver receiver_of(Surface s, vec2 map_size)

@@ -17,14 +17,14 @@ uvec4 sat_at(int x, int y)
 vec4 sat_mean_whole(ivec2 low, ivec2 high)
 {
     uvec4 sum = sat_at(high.x, high.y) - sat_at(low.x, high.y) - sat_at(high.x, low.y) +
-        sat_at(low.x, low.y);
+                sat_at(low.x, low.y);
     ivec2 size = high - low;
     return vec4(sum) * (sat_info.inverse_scale / float(size.x * size.y));
 }
 
-// Mean over [low, high] in texels, 0 <= low < high <= side; texels that the border cuts count by the
-// part that lies inside. 16 loads: sums to fractional corners are bilinear in those to whole ones,
-// and are taken relative to one corner while they are integers.
+// Mean over [low, high] in texels, 0 <= low < high <= side; texels that the border cuts count by
+// the part that lies inside. 16 loads: sums to fractional corners are bilinear in those to whole
+// ones, and are taken relative to one corner while they are integers.
 vec4 sat_mean(vec2 low, vec2 high)
 {
     int last = int(sat_info.side);

@@ -1,11 +1,11 @@
-// Sampling patterns of kernels over the emitter's shape, points in [-1, 1]^2. A pattern is walked by
-// adding a constant, so that a tap costs no trigonometry.
+// Sampling patterns of kernels over the emitter's shape, points in [-1, 1]^2. A pattern is walked
+// by adding a constant, so that a tap costs no trigonometry.
 //
 // Rectangle: the R2 sequence. Disk: Vogel's spiral (1979), equal area per tap.
 #include "sequences.glsl"
 
 struct Taps {
-    vec2 at;        // R2 state in [0, 1)^2, or unit direction of the spiral
+    vec2 at; // R2 state in [0, 1)^2, or unit direction of the spiral
     float index, inverse_count;
 };
 
@@ -39,8 +39,8 @@ vec2 taps_next(inout Taps t)
 }
 
 // One of 16 shifts, a different one for each pixel of every 4 x 4 block (Keller and Heidrich 2001):
-// the Hammersley set of 16 points. Multiples of the R2 step would not do: a pattern shifted by them is
-// the same sequence further on, and 16 of those overlap almost entirely.
+// the Hammersley set of 16 points. Multiples of the R2 step would not do: a pattern shifted by them
+// is the same sequence further on, and 16 of those overlap almost entirely.
 vec2 interleaved_shift(ivec2 pixel)
 {
     // Bits of x and y interleaved, so that neighbours are far apart in the set.

@@ -10,6 +10,6 @@ void main()
     for (int i = 1; i <= int(blur.step.z); i++)
         sum += (texture(source, uv + float(i) * blur.step.xy) +
                    texture(source, uv - float(i) * blur.step.xy)) *
-            blur.weights[i >> 2][i & 3];
+               blur.weights[i >> 2][i & 3];
     result = sum;
 }

@@ -2,7 +2,8 @@
 #ifdef ALPHA
 #include "hash.glsl"
 #include "material.glsl"
-layout(location = LOCATION_SEED) uniform uint seed; // of the hashed threshold: differs between maps that are averaged
+layout(location = LOCATION_SEED)
+    uniform uint seed; // of the hashed threshold: differs between maps that are averaged
 in vec4 v_uv;
 in vec4 v_color;
 flat in uint v_material;

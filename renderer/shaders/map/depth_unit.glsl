@@ -4,8 +4,8 @@
 float depth_unit(float d) // from hardware depth
 {
     return light.parallel != 0
-        ? d
-        : d * light.near_z / (light.far_z - d * (light.far_z - light.near_z));
+               ? d
+               : d * light.near_z / (light.far_z - d * (light.far_z - light.near_z));
 }
 
 float depth_unit_of_z(float z) // from m
@@ -21,9 +21,9 @@ float depth_unit_to_z(float u)
 // The receiver's plane as seen in a window of the map: what a statistic of that window is compared
 // with.
 struct PlaneInWindow {
-    float mean;           // not above the mean of the plane, clamped to far_z, over the window
+    float mean;            // not above the mean of the plane, clamped to far_z, over the window
     float lowest, highest; // bounds of the plane over the window
-    bool clamped;         // the plane reaches beyond far_z there
+    bool clamped;          // the plane reaches beyond far_z there
 };
 
 // `offset`: centre of the window minus the receiver's own position; `extent`: its half size; m on

@@ -34,7 +34,8 @@ void main()
 #ifdef FROM_DEPTH
     // Linear depth grows with hardware depth: two conversions are enough.
     vec4 d = textureGather(source, (vec2(base) + 1.0) / vec2(size));
-    range = vec2(linear(min(min(d.x, d.y), min(d.z, d.w))), linear(max(max(d.x, d.y), max(d.z, d.w))));
+    range =
+        vec2(linear(min(min(d.x, d.y), min(d.z, d.w))), linear(max(max(d.x, d.y), max(d.z, d.w))));
 #else
     range = both(both(load(base, from.level.x), load(base + ivec2(1, 0), from.level.x)),
         both(load(base + ivec2(0, 1), from.level.x), load(base + ivec2(1, 1), from.level.x)));

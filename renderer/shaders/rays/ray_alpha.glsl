@@ -37,8 +37,8 @@ float alpha_sample(uint first, ivec2 size, uint flags, vec2 uv)
         return alpha_texel(first, size, wrap, ivec2(floor(s))) / 255.0;
     vec2 low = floor(s - 0.5), t = s - 0.5 - low;
     ivec2 i = ivec2(low);
-    float top = mix(alpha_texel(first, size, wrap, i),
-        alpha_texel(first, size, wrap, i + ivec2(1, 0)), t.x);
+    float top = mix(
+        alpha_texel(first, size, wrap, i), alpha_texel(first, size, wrap, i + ivec2(1, 0)), t.x);
     float bottom = mix(alpha_texel(first, size, wrap, i + ivec2(0, 1)),
         alpha_texel(first, size, wrap, i + ivec2(1, 1)), t.x);
     return mix(top, bottom, t.y) / 255.0;
@@ -50,7 +50,8 @@ bool ray_alpha_hit(uint record, vec2 uv)
     vec3 weight = vec3(1.0 - uv.x - uv.y, uv);
     uint m = WORDS * t.material;
     uint first = alpha_words[m + WORD_FIRST], flags = alpha_words[m + WORD_FLAGS];
-    float alpha = dot(weight, vec3(t.a[0], t.a[1], t.a[2])) * uintBitsToFloat(alpha_words[m + WORD_FACTOR]);
+    float alpha =
+        dot(weight, vec3(t.a[0], t.a[1], t.a[2])) * uintBitsToFloat(alpha_words[m + WORD_FACTOR]);
     float threshold = uintBitsToFloat(alpha_words[m + WORD_CUTOFF]);
     if (first != NO_TEXELS) {
         vec2 s = weight.x * t.uv[0] + weight.y * t.uv[1] + weight.z * t.uv[2];

@@ -4,12 +4,12 @@
 const float RAY_END = 0.9999; // just before the light, which may be a mesh itself
 
 struct RayReceiver {
-    vec3 origin;            // lifted
-    vec3 base, a, b;        // from there to the light's centre, and its half axes
+    vec3 origin;     // lifted
+    vec3 base, a, b; // from there to the light's centre, and its half axes
     float cos_base, cos_a, cos_b, front;
     uint id;
     ivec2 shift;
-    bool reachable;         // some light point is in front
+    bool reachable; // some light point is in front
 };
 
 // A frame whose z is the unit vector `to`, turned from the light's own by the smallest rotation
@@ -58,8 +58,8 @@ bool load_receiver(ivec2 pixel, uvec4 net, out RayReceiver r)
     r.cos_base = dot(n, r.base);
     r.cos_a = dot(n, r.a);
     r.cos_b = dot(n, r.b);
-    r.reachable = away > 0.0 && r.front > 0.0 && !outside &&
-        r.cos_base + abs(r.cos_a) + abs(r.cos_b) > 0.0;
+    r.reachable =
+        away > 0.0 && r.front > 0.0 && !outside && r.cos_base + abs(r.cos_a) + abs(r.cos_b) > 0.0;
     vec3 lift = receiver_lift(p) * n;
     r.origin = p + lift;
     if (LIGHT_TYPE != PEN_TRACE_SUN)

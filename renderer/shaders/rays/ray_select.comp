@@ -55,6 +55,5 @@ void main()
         base = atomicAdd(counters.list_count, used);
     barrier();
     if (full || lit)
-        list[base + place] =
-            uint(pixel.y) * ray.size.x + uint(pixel.x) | (lit ? LIST_LIT : 0u);
+        list[base + place] = uint(pixel.y) * ray.size.x + uint(pixel.x) | (lit ? LIST_LIT : 0u);
 }

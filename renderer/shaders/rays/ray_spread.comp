@@ -1,5 +1,6 @@
-// Marks what lies within DILATION receivers in x of a mixed verdict, or of lit beside umbra: a contact
-// or a silhouette whose penumbra is thinner than a receiver. ray_select.comp spreads it in y.
+// Marks what lies within DILATION receivers in x of a mixed verdict, or of lit beside umbra: a
+// contact or a silhouette whose penumbra is thinner than a receiver. ray_select.comp spreads it in
+// y.
 #include "rays.def"
 layout(local_size_x = RAY_TILE, local_size_y = RAY_TILE) in;
 #include "ray_job.glsl"

@@ -12,6 +12,7 @@ void main()
     float depth = texelFetch(g_depth, pixel, 0).r;
     bool hit = depth != 0.0;
     vec3 n = octahedral_decode(texelFetch(g_normal, pixel, 0).xy);
-    position = hit ? vec4(unproject(view.clip_to_world, pixel_to_ndc(pixel), depth), 1.0) : vec4(0.0);
+    position =
+        hit ? vec4(unproject(view.clip_to_world, pixel_to_ndc(pixel), depth), 1.0) : vec4(0.0);
     normal = hit ? vec4(n, 0.0) : vec4(0.0);
 }

@@ -18,9 +18,9 @@ int owned_receivers(ivec2 first, ivec2 end)
     return count;
 }
 
-// Whether all of the emitter is above the horizon of every receiver of the tile. What turns away from
-// it may be thin or leave no depth in the map, and still sees nothing of the light. `low`, `high`:
-// bounds of the receivers.
+// Whether all of the emitter is above the horizon of every receiver of the tile. What turns away
+// from it may be thin or leave no depth in the map, and still sees nothing of the light. `low`,
+// `high`: bounds of the receivers.
 bool all_face_light(ivec2 first, ivec2 end, vec3 low, vec3 high)
 {
     // Most such tiles are flat: one normal, at the worst corner of the bounds.
@@ -64,10 +64,12 @@ float classify_tile(ivec2 first, ivec2 size, out int receivers)
     vec2 ndc_high = pixel_to_ndc(end - 1) + vec2(1.0, -1.0) * view.viewport.zw;
     vec2 q_low = vec2(1e30), q_high = vec2(-1e30);
     vec3 p_low = vec3(1e30), p_high = vec3(-1e30);
-    vec4 nearest_side = vec4(1e30), farthest_side = vec4(-1e30); // of a cube face's pyramid, out > 0
+    vec4 nearest_side = vec4(1e30),
+         farthest_side = vec4(-1e30); // of a cube face's pyramid, out > 0
     bool behind = false;
     for (int i = 0; i < 8; i++) {
-        vec2 ndc = vec2((i & 1) != 0 ? ndc_high.x : ndc_low.x, (i & 2) != 0 ? ndc_high.y : ndc_low.y);
+        vec2 ndc =
+            vec2((i & 1) != 0 ? ndc_high.x : ndc_low.x, (i & 2) != 0 ? ndc_high.y : ndc_low.y);
         vec3 p = unproject(light.clip_to_light, ndc, (i & 4) != 0 ? high : low);
         p_low = min(p_low, p);
         p_high = max(p_high, p);
@@ -95,7 +97,8 @@ float classify_tile(ivec2 first, ivec2 size, out int receivers)
     if (behind)
         return TILE_UNDECIDED; // beside or behind the light: nothing to project
     vec2 texel = (light.rect.zw - light.rect.xy) / vec2(2 * textureSize(min_max_pyramid, 0));
-    vec2 center = 0.5 * (q_low + q_high), spread = 0.5 * (q_high - q_low) + classify.margin.x * texel;
+    vec2 center = 0.5 * (q_low + q_high),
+         spread = 0.5 * (q_high - q_low) + classify.margin.x * texel;
     float pixel = view.forward.w / (low * view.eye.w); // m, of the farthest receiver
     spread += classify.margin.y * pixel * (light.parallel != 0 ? 1.0 : light.near_z / near_z);
     vec2 search = light_search_extent(far_z) + spread;
@@ -133,11 +136,11 @@ float classify_tile(ivec2 first, ivec2 size, out int receivers)
         }
     if (!blocked)
         return all_face_light(first, end, p_low, p_high) ? TILE_LIT : TILE_UNDECIDED;
-    // In umbra every texel of every window blocks: the windows must not reach over the map's border,
-    // where nothing is, and lie wholly in front of the nearest receiver.
+    // In umbra every texel of every window blocks: the windows must not reach over the map's
+    // border, where nothing is, and lie wholly in front of the nearest receiver.
     vec2 window = reach + spread;
     bool inside = all(greaterThan(center - window, light.rect.xy)) &&
-        all(lessThan(center + window, light.rect.zw));
+                  all(lessThan(center + window, light.rect.zw));
     bool dark = min_max_window(center, window).y < near_z * 0.98 - slack;
     return inside && dark && classify.tile.y != 0 ? TILE_UMBRA : TILE_UNDECIDED;
 }

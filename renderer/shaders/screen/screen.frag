@@ -25,8 +25,8 @@ void main()
     if (s.p.z <= 0.0 && !light_parallel)
         vis = vec4(0.0);
     else {
-        // Coarse facets turn away from the light before the smooth surface that they stand for does:
-        // there its normal is the receiver's plane, or the terminator would show the facets.
+        // Coarse facets turn away from the light before the smooth surface that they stand for
+        // does: there its normal is the receiver's plane, or the terminator would show the facets.
         if (!light_is_above_horizon(s.p, s.n))
             s.n = surface_shading_normal(pixel);
         vis = light_is_above_horizon(s.p, s.n) ? visibility(s) : vec4(0.0);

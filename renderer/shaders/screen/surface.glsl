@@ -7,9 +7,9 @@ layout(binding = UNIT_DEPTH) uniform sampler2D g_depth;
 layout(binding = UNIT_NORMAL) uniform sampler2D g_normal;
 
 struct Surface {
-    vec3 p;       // m, light space
-    vec3 n;       // unit geometric normal, light space, towards the viewer
-    float depth;  // hardware depth of the camera, reversed
+    vec3 p;      // m, light space
+    vec3 n;      // unit geometric normal, light space, towards the viewer
+    float depth; // hardware depth of the camera, reversed
     ivec2 pixel;
 };
 

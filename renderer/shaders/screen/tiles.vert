@@ -1,5 +1,5 @@
-// One point as large as a tile per tile of the wanted class; the others are clipped away. A point is
-// one square for the rasteriser, where two triangles would shade the blocks on their seam twice.
+// One point as large as a tile per tile of the wanted class; the others are clipped away. A point
+// is one square for the rasteriser, where two triangles would shade the blocks on their seam twice.
 layout(binding = UNIT_TILES) uniform sampler2D tile_classes;
 layout(location = LOCATION_TILE) uniform ivec2 tile; // x: px, y: enum tile_class, the one to draw
 

@@ -170,8 +170,8 @@ bool psc_builder_add_mesh(struct psc_builder *builder, const struct psc_mesh *me
             p.bounds_min[k] = !i || x < p.bounds_min[k] ? x : p.bounds_min[k];
             p.bounds_max[k] = !i || x > p.bounds_max[k] ? x : p.bounds_max[k];
         }
-    if (psc_is_watertight((const float(*)[3])g.positions, g.vertex_count, g.indices, g.index_count))
-        p.flags |= PSC_WATERTIGHT;
+    p.flags =
+        psc_surface_flags((const float(*)[3])g.positions, g.vertex_count, g.indices, g.index_count);
 
     append_vertices(builder, &g);
     p.meshlet_count = append_meshlets(builder, &g, mesh, p.first_index);

@@ -34,7 +34,8 @@ static bool check_primitive(
         (uint64_t)p->first_vertex + p->vertex_count > scene->vertex_count ||
         (uint64_t)p->first_meshlet + p->meshlet_count > scene->meshlet_count)
         return DAMAGED(error, "a primitive's ranges leave their sections.");
-    if (p->material >= scene->material_count || p->flags & ~(uint32_t)PSC_WATERTIGHT)
+    if (p->material >= scene->material_count ||
+        p->flags & ~(uint32_t)(PSC_WATERTIGHT | PSC_OUTWARD))
         return DAMAGED(error, "a primitive's material or flags are unknown.");
     if (!all_finite(p->bounds_min, 6))
         return DAMAGED(error, "a primitive's bounds are not finite.");

@@ -28,10 +28,11 @@ void psc_geometry_make_tangents(struct geometry *geometry);
 /* Bounding sphere and normal cone of the triangles in m's index range; conservative. */
 void psc_meshlet_bound(struct psc_meshlet *m, const float (*positions)[3], const uint32_t *indices);
 
-/* Whether every edge, vertices joined by position, is shared by exactly two triangles that run
- * through it in opposite directions. Triangles without three distinct corners are ignored. */
-bool psc_is_watertight(const float (*positions)[3], uint32_t vertex_count, const uint32_t *indices,
-    uint32_t index_count);
+/* enum psc_primitive_flags. Watertight: every edge, vertices joined by position, is shared by exactly
+ * two triangles that run through it in opposite directions. Triangles without three distinct corners
+ * are ignored. */
+uint32_t psc_surface_flags(const float (*positions)[3], uint32_t vertex_count,
+    const uint32_t *indices, uint32_t index_count);
 
 /* Fills the levels after the first of an RGBA8 chain that starts at `texels`. */
 void psc_make_mips(uint8_t *texels, uint32_t width, uint32_t height, bool srgb);

@@ -63,7 +63,10 @@ struct psc_meshlet {
     float cone_axis[3], cone_cutoff;
 };
 
-enum psc_primitive_flags { PSC_WATERTIGHT = 1 }; /* every edge is shared by exactly two triangles */
+enum psc_primitive_flags {
+    PSC_WATERTIGHT = 1, /* every edge is shared by exactly two triangles */
+    PSC_OUTWARD = 2,    /* watertight, and no connected part has a negative volume */
+};
 
 struct psc_primitive {
     uint32_t first_index, index_count;

@@ -1,5 +1,6 @@
 #include "protocol/memory.h"
 #include "renderer/blob/geometry.h"
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -85,11 +86,57 @@ static bool edges_match(const uint32_t *first, const uint32_t *indices, uint32_t
     return match;
 }
 
-bool psc_is_watertight(const float (*positions)[3], uint32_t vertex_count, const uint32_t *indices,
-    uint32_t index_count)
+static uint32_t root_of(uint32_t *parent, uint32_t v)
+{
+    while (parent[v] != v)
+        v = parent[v] = parent[parent[v]];
+    return v;
+}
+
+/* Whether no connected part of a closed surface has a negative volume (the sum of the tetrahedra
+ * under its triangles). A little below zero, for flat parts, is rounding. */
+static bool faces_outwards(const float (*positions)[3], uint32_t vertex_count,
+    const uint32_t *first, const uint32_t *indices, uint32_t index_count)
+{
+    uint32_t *parent = pen_alloc(vertex_count, sizeof *parent);
+    double(*volume)[2] = pen_alloc_zero(vertex_count, sizeof *volume); /* signed, of amounts */
+    for (uint32_t v = 0; v < vertex_count; v++)
+        parent[v] = v;
+    for (uint32_t i = 0; i < index_count; i += 3)
+        for (int c = 1; c < 3; c++) {
+            uint32_t a = root_of(parent, first[indices[i]]);
+            parent[root_of(parent, first[indices[i + (uint32_t)c]])] = a;
+        }
+    for (uint32_t i = 0; i < index_count; i += 3) {
+        uint32_t root = root_of(parent, first[indices[i]]);
+        double p[3][3];
+        for (int k = 0; k < 3; k++) /* from a point of the part, so that distance costs nothing */
+            for (int c = 0; c < 3; c++)
+                p[k][c] =
+                    (double)positions[indices[i + (uint32_t)k]][c] - (double)positions[root][c];
+        double amount = 0, signed_amount = 0;
+        for (int c = 0; c < 3; c++) {
+            int d = (c + 1) % 3, e = (c + 2) % 3;
+            double minor = p[1][d] * p[2][e] - p[1][e] * p[2][d];
+            signed_amount += p[0][c] * minor;
+            amount += fabs(p[0][c] * minor);
+        }
+        volume[root][0] += signed_amount;
+        volume[root][1] += amount;
+    }
+    bool outward = true;
+    for (uint32_t v = 0; v < vertex_count; v++)
+        outward = outward && volume[v][0] >= -1e-9 * volume[v][1];
+    free(parent);
+    free(volume);
+    return outward;
+}
+
+uint32_t psc_surface_flags(const float (*positions)[3], uint32_t vertex_count,
+    const uint32_t *indices, uint32_t index_count)
 {
     if (!index_count)
-        return false;
+        return 0;
     uint64_t *hashes = pen_alloc(vertex_count, sizeof *hashes);
     for (uint32_t v = 0; v < vertex_count; v++)
         hashes[v] = position_hash(positions[v]);
@@ -106,13 +153,15 @@ bool psc_is_watertight(const float (*positions)[3], uint32_t vertex_count, const
         for (int c = 0; c < 3; c++)
             sum += mix(h[c] + 3 * h[(c + 1) % 3]) - mix(h[(c + 1) % 3] + 3 * h[c]);
     }
-    bool watertight = any && sum == 0;
+    bool watertight = any && sum == 0, outward = false;
     if (watertight) {
         uint32_t *first = pen_alloc(vertex_count, sizeof *first);
         weld(positions, vertex_count, hashes, first);
         watertight = edges_match(first, indices, index_count);
+        outward =
+            watertight && faces_outwards(positions, vertex_count, first, indices, index_count);
         free(first);
     }
     free(hashes);
-    return watertight;
+    return (watertight ? PSC_WATERTIGHT : 0u) | (outward ? PSC_OUTWARD : 0u);
 }

@@ -261,7 +261,6 @@ void light_face_cull(
     if (f->parallel)
         glm_vec3_normalize(cull->eye);
     cull->parallel = f->parallel;
-    cull->cull_back = true;
 }
 
 static void fit_face(struct light_face *f, const struct light *light, const struct scene *scene)

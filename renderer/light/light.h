@@ -35,6 +35,6 @@ void light_face_window(
 /* Marks the instances that cannot cast in this light: flat and on the far border of the bounds. */
 void light_find_backdrops(const struct light *light, const struct scene *scene, bool *backdrop);
 
-/* What a depth pass of this face culls with. */
+/* The view of a depth pass of this face; which faces it culls is the caller's to say. */
 void light_face_cull(const struct light_face *face, const float sample[2], const float rect[4],
     struct cull_view *cull);

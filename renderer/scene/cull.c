@@ -18,7 +18,7 @@ static void object_matrix(const float world[12], mat4 m)
 }
 
 static void to_object(const struct cull_view *view, const struct psc_instance *instance,
-    bool double_sided, struct object_view *out)
+    bool cull_back, struct object_view *out)
 {
     mat4 world, clip, inverse;
     object_matrix(instance->world, world);
@@ -36,8 +36,8 @@ static void to_object(const struct cull_view *view, const struct psc_instance *i
         float length = glm_vec3_norm(out->planes[i]);
         glm_vec4_scale(out->planes[i], length > 0 ? 1 / length : 1, out->planes[i]);
     }
-    out->cone = view->cull_back && !double_sided && !(instance->flags & PSC_MIRRORED) &&
-                fabsf(glm_mat4_det(world)) > 1e-20f;
+    out->cone =
+        cull_back && !(instance->flags & PSC_MIRRORED) && fabsf(glm_mat4_det(world)) > 1e-20f;
     if (!out->cone)
         return;
     glm_mat4_inv(world, inverse);
@@ -68,11 +68,11 @@ static bool is_visible(
 }
 
 uint64_t cull_instance(const struct cull_view *view, const struct psc_scene *blob,
-    uint32_t instance, bool double_sided, struct cull_command *commands, uint32_t *count)
+    uint32_t instance, bool cull_back, struct cull_command *commands, uint32_t *count)
 {
     const struct psc_primitive *primitive = &blob->primitives[blob->instances[instance].primitive];
     struct object_view object;
-    to_object(view, &blob->instances[instance], double_sided, &object);
+    to_object(view, &blob->instances[instance], cull_back, &object);
     uint64_t indices = 0;
     struct cull_command *run = NULL;
     for (uint32_t i = 0; i < primitive->meshlet_count; i++) {

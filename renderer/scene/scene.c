@@ -154,6 +154,12 @@ static const struct psc_material *material_of(const struct scene *s, uint32_t in
     return &s->blob.materials[s->blob.primitives[s->blob.instances[instance].primitive].material];
 }
 
+static bool is_closed(const struct scene *s, uint32_t instance)
+{
+    const struct psc_primitive *p = &s->blob.primitives[s->blob.instances[instance].primitive];
+    return (p->flags & PSC_OUTWARD) && material_of(s, instance)->alpha_mode == PSC_OPAQUE;
+}
+
 static uint64_t state_key(const struct scene *s, uint32_t instance)
 {
     const struct psc_material *m = material_of(s, instance);
@@ -161,7 +167,8 @@ static uint64_t state_key(const struct scene *s, uint32_t instance)
     uint64_t textured = has_textures(m) || alpha
                             ? 1 + s->blob.primitives[s->blob.instances[instance].primitive].material
                             : 0;
-    return (uint64_t)alpha << 40 | (uint64_t)((m->flags & PSC_DOUBLE_SIDED) != 0) << 39 |
+    return (uint64_t)is_closed(s, instance) << 41 | (uint64_t)alpha << 40 |
+           (uint64_t)((m->flags & PSC_DOUBLE_SIDED) != 0) << 39 |
            (uint64_t)(s->blob.instances[instance].flags & PSC_MIRRORED) << 38 | textured;
 }
 
@@ -199,6 +206,7 @@ static void make_groups(struct scene *s)
                 .material = material ? material - 1 : UINT32_MAX,
                 .double_sided = (m->flags & PSC_DOUBLE_SIDED) != 0,
                 .mirrored = (s->blob.instances[sorted[i].instance].flags & PSC_MIRRORED) != 0,
+                .closed = is_closed(s, sorted[i].instance),
                 .alpha = m->alpha_mode != PSC_OPAQUE};
         }
         s->groups[s->group_count - 1].count++;
@@ -390,21 +398,43 @@ static void bind_material(struct scene *s, uint32_t material)
     }
 }
 
+/* Seen from inside, a closed surface shows its back. */
+static bool is_inside(const struct scene *s, const struct scene_group *g, const float eye[3])
+{
+    for (uint32_t i = 0; i < g->count; i++) {
+        const float(*b)[3] = s->instance_bounds[s->order[g->first + i]];
+        if (eye[0] >= b[0][0] && eye[0] <= b[1][0] && eye[1] >= b[0][1] && eye[1] <= b[1][1] &&
+            eye[2] >= b[0][2] && eye[2] <= b[1][2])
+            return true;
+    }
+    return false;
+}
+
+static bool culls_back(
+    const struct scene *s, const struct scene_group *group, const struct cull_view *view)
+{
+    if (view->faces == CULL_CLOSED)
+        return group->closed && (view->parallel || !is_inside(s, group, view->eye));
+    return view->faces == CULL_SINGLE_SIDED && !group->double_sided;
+}
+
 uint64_t scene_draw(struct scene *s, const struct cull_view *view, const struct scene_pass *pass)
 {
     struct run {
         uint32_t first, count;
+        bool cull_back;
     };
     uint32_t total = 0;
     uint64_t triangles = 0;
     struct run *runs = pen_alloc_zero(s->group_count + 1, sizeof *runs);
     for (uint32_t g = 0; g < s->group_count; g++) {
         runs[g].first = total;
+        runs[g].cull_back = culls_back(s, &s->groups[g], view);
         for (uint32_t i = 0; i < s->groups[g].count; i++) {
             uint32_t instance = s->order[s->groups[g].first + i];
             if (!pass->hidden || !pass->hidden[instance])
                 triangles += cull_instance(
-                    view, &s->blob, instance, s->groups[g].double_sided, s->command_room, &total);
+                    view, &s->blob, instance, runs[g].cull_back, s->command_room, &total);
         }
         runs[g].count = total - runs[g].first;
     }
@@ -423,10 +453,10 @@ uint64_t scene_draw(struct scene *s, const struct cull_view *view, const struct 
         gl.BindVertexArray(pass->full || textured ? s->full_array : s->depth_array);
         if (textured)
             bind_material(s, group->material);
-        if (group->double_sided || !view->cull_back)
-            gl.Disable(GL_CULL_FACE);
-        else
+        if (runs[g].cull_back)
             gl.Enable(GL_CULL_FACE);
+        else
+            gl.Disable(GL_CULL_FACE);
         gl.FrontFace(group->mirrored != pass->front_is_clockwise ? GL_CW : GL_CCW);
         gl.MultiDrawElementsIndirect(GL_TRIANGLES, GL_UNSIGNED_INT,
             (const void *)(uintptr_t)(runs[g].first * sizeof *s->command_room),

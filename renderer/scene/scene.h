@@ -17,7 +17,8 @@ struct scene_group {
     uint32_t first, count; /* of scene->order */
     uint32_t material;     /* whose textures are bound; UINT32_MAX: none needed */
     bool double_sided, mirrored;
-    bool alpha; /* MASK or BLEND: fragments may be discarded */
+    bool closed; /* its surfaces are closed, face outwards and have no holes */
+    bool alpha;  /* MASK or BLEND: fragments may be discarded */
 };
 
 struct scene {

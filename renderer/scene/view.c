@@ -163,5 +163,5 @@ void view_to_cull(const struct view *v, struct cull_view *cull)
     memset(cull, 0, sizeof *cull);
     memcpy(cull->world_to_clip, v->world_to_clip, sizeof cull->world_to_clip);
     memcpy(cull->eye, v->eye, sizeof cull->eye);
-    cull->cull_back = true;
+    cull->faces = CULL_SINGLE_SIDED;
 }

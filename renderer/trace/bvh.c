@@ -338,8 +338,8 @@ static float enter(
     return near <= far * 1.0000005f ? near : INFINITY; /* rounding must not lose a box */
 }
 
-static bool hits(
-    const struct pen_bvh_triangle *t, const float origin[3], const float direction[3], float limit)
+static bool hits(const struct pen_bvh_triangle *t, bool front_only, const float origin[3],
+    const float direction[3], float limit)
 {
     float p[3], q[3], s[3];
     for (int c = 0; c < 3; c++) {
@@ -353,7 +353,7 @@ static bool hits(
     }
     /* Moeller & Trumbore 1997: positive when the ray meets the front. */
     float determinant = t->edge1[0] * p[0] + t->edge1[1] * p[1] + t->edge1[2] * p[2];
-    if (determinant == 0 || (determinant > 0 && !(t->flags & PEN_BVH_TWO_SIDED)))
+    if (determinant == 0 || (front_only && determinant > 0 && !(t->flags & PEN_BVH_TWO_SIDED)))
         return false;
     float u = (s[0] * p[0] + s[1] * p[1] + s[2] * p[2]) / determinant;
     float v = (direction[0] * q[0] + direction[1] * q[1] + direction[2] * q[2]) / determinant;
@@ -361,8 +361,8 @@ static bool hits(
     return u >= 0 && v >= 0 && u + v <= 1 && at > 0 && at < limit;
 }
 
-bool pen_bvh_occluded(
-    const struct pen_bvh *bvh, const float origin[3], const float direction[3], float limit)
+bool pen_bvh_occluded(const struct pen_bvh *bvh, bool front_only, const float origin[3],
+    const float direction[3], float limit)
 {
     uint32_t stack[PEN_BVH_STACK], waiting = 0, at = 0;
     float inverse[3];
@@ -374,7 +374,7 @@ bool pen_bvh_occluded(
     for (;;) {
         const struct pen_bvh_node *node = &bvh->nodes[at];
         for (uint32_t i = 0; i < node->count; i++)
-            if (hits(&bvh->triangles[node->first + i], origin, direction, limit))
+            if (hits(&bvh->triangles[node->first + i], front_only, origin, direction, limit))
                 return true;
         if (node->count == 0 && bvh->triangle_count) {
             float left = enter(&bvh->nodes[node->first], origin, inverse, limit);

@@ -29,8 +29,8 @@ bool pen_bvh_build(const struct pen_bvh_triangle *triangles, uint32_t count, str
     struct pen_error *error);
 void pen_bvh_finish(struct pen_bvh *bvh); /* harmless on a zeroed one */
 
-/* Whether a triangle lies on origin + t direction, 0 < t < limit, under the rule of shadows: a
- * single-sided triangle counts when its front faces along the direction, that is the light. Alpha
- * is not looked at. */
-bool pen_bvh_occluded(
-    const struct pen_bvh *bvh, const float origin[3], const float direction[3], float limit);
+/* Whether a triangle lies on origin + t direction, 0 < t < limit, under the rule of shadows:
+ * front_only, a single-sided triangle counts when its front faces along the direction, that is the
+ * light. Alpha is not looked at. */
+bool pen_bvh_occluded(const struct pen_bvh *bvh, bool front_only, const float origin[3],
+    const float direction[3], float limit);

@@ -111,7 +111,7 @@ static inline void filter_alpha(const struct RTCFilterFunctionNArguments *args, 
             h = trace_hash(h + primitive * 0x9e3779b9u);
             threshold = ((float)(h >> 8) + 0.5f) * 0x1p-24f;
         }
-        if ((!m->two_sided && faces_end(args, i) != end) ||
+        if ((!m->two_sided && !filter->both_sides && faces_end(args, i) != end) ||
             trace_alpha_at(alpha, primitive, float_at(args->hit, HIT_U, n, i),
                 float_at(args->hit, HIT_V, n, i)) < threshold)
             args->valid[i] = 0;

@@ -1,4 +1,5 @@
-/* Embree's hierarchies, one per light, kept between calls. */
+/* Embree's hierarchies, kept between calls: one for all lights, or one per light where only fronts
+ * cast. */
 #include "renderer/trace/internal.h"
 #include <math.h>
 #include <stdlib.h>
@@ -18,6 +19,7 @@ static int side_of(const struct trace_silhouette *light, const float corner[3][3
     float a = trace_dot(n, light->a), b = trace_dot(n, light->b);
     switch (light->shape) {
     case TRACE_EYE:
+    case TRACE_BOTH_SIDES:
         return 0;
     case TRACE_SQUARE:
         reach = fabsf(a) + fabsf(b);
@@ -125,12 +127,16 @@ static bool build(struct pen_trace_scene *scene, struct trace_hierarchy *h, stru
         [TRACE_GEOMETRY_TWO_SIDED] = scene->triangle_count[TRACE_TWO_SIDED],
         [TRACE_GEOMETRY_MIXED] = scene->triangle_count[TRACE_FACING],
         [TRACE_GEOMETRY_ALPHA] = scene->triangle_count[TRACE_ALPHA]};
-    if (h->light.shape != TRACE_EYE) {
+    bool both_sides = h->light.shape == TRACE_BOTH_SIDES;
+    if (both_sides) {
+        counts[TRACE_GEOMETRY_FRONT] = counts[TRACE_GEOMETRY_MIXED];
+        counts[TRACE_GEOMETRY_MIXED] = 0;
+    } else if (h->light.shape != TRACE_EYE) {
         counts[TRACE_GEOMETRY_MIXED] = counts[TRACE_GEOMETRY_ALPHA] = 0;
         if (!cull(scene, h, counts, error))
             return false;
     }
-    h->filter = (struct trace_filter){&scene->alpha, h->alpha_triangles};
+    h->filter = (struct trace_filter){&scene->alpha, h->alpha_triangles, both_sides};
     h->scene = rtcNewScene(scene->device);
     if (!h->scene)
         return trace_check_device(scene, error);

@@ -16,7 +16,7 @@ enum trace_group {
 /* Geometry ids within a hierarchy. */
 enum trace_geometry {
     TRACE_GEOMETRY_TWO_SIDED,
-    TRACE_GEOMETRY_FRONT, /* of TRACE_FACING, for shadows: those that face the whole light */
+    TRACE_GEOMETRY_FRONT, /* of TRACE_FACING, for shadows: those that face the whole light, or all */
     TRACE_GEOMETRY_MIXED, /* those whose plane cuts the light; for primary rays all of them */
     TRACE_GEOMETRY_ALPHA,
     TRACE_GEOMETRY_GROUND,
@@ -45,14 +45,21 @@ struct trace_alpha {
 };
 
 /* What decides on which side of a triangle's plane a light lies: its centre (sun: the direction to
- * it) and half axes. */
+ * it) and half axes. BOTH_SIDES: nobody asks, and one hierarchy serves every light. */
 struct trace_silhouette {
-    enum { TRACE_EYE, TRACE_SQUARE, TRACE_ROUND, TRACE_BALL, TRACE_PARALLEL } shape;
+    enum {
+        TRACE_EYE,
+        TRACE_BOTH_SIDES,
+        TRACE_SQUARE,
+        TRACE_ROUND,
+        TRACE_BALL,
+        TRACE_PARALLEL
+    } shape;
     float center[3], a[3], b[3]; /* BALL: the radius in a[0] */
 };
 
-/* One of Embree's hierarchies over the scene. For shadows it leaves out what can never count: the
- * triangles of single-sided materials that turn their back to every point of the light. */
+/* One of Embree's hierarchies over the scene. Where only fronts cast it leaves out what can never
+ * count: the triangles of single-sided materials that turn their back to every point of the light. */
 struct trace_hierarchy {
     RTCScene scene;
     RTCGeometry geometries[TRACE_GEOMETRIES];
@@ -61,6 +68,7 @@ struct trace_hierarchy {
     struct trace_filter {
         const struct trace_alpha *alpha;
         const uint32_t *triangles; /* alpha_triangles, or NULL: the same */
+        bool both_sides;           /* facing does not count */
     } filter;
     struct trace_silhouette light; /* what it was made for */
     uint64_t last_use;             /* 0: unused slot */

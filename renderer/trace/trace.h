@@ -2,14 +2,15 @@
  * method is measured against. No GL. Units are metres, world space; colours are linear RGB.
  *
  * Who casts: every triangle of the scene, under the rules of the shadow maps. A triangle of a
- * single-sided material casts only when its front faces the light; a MASK texel below the cutoff
- * casts nothing; a BLEND surface stops a share alpha of the rays (a stochastic threshold whose mean
+ * single-sided material casts with both sides or, front_only, only when its front faces the light; a
+ * MASK texel below the cutoff casts nothing; a BLEND surface stops a share alpha of the rays (a stochastic threshold whose mean
  * is exact). Textures are read at their finest level. */
 #pragma once
 #include "renderer/blob/pscene.h"
 
-/* World-space triangles, and the hierarchies that the last few lights needed: one per light,
- * because it leaves out the triangles that turn their back to it. One call at a time per scene. */
+/* World-space triangles, and the hierarchies that the last few lights needed: one for all of them
+ * or, front_only, one per light, because it leaves out the triangles that turn their back to it. One
+ * call at a time per scene. */
 struct pen_trace_scene;
 
 /* A horizontal square that receives and casts; two-sided. */
@@ -74,6 +75,7 @@ struct pen_trace_job {
     uint32_t samples;       /* per receiver, at most; rounded up to a power of two, 1 .. 65536 */
     float target_error;     /* stop when the standard error is below; 0: always all samples */
     uint32_t weighting;     /* enum pen_trace_weighting */
+    bool front_only;        /* single-sided triangles cast only to their front */
     bool adaptive;          /* all samples only near receivers whose pre-test is mixed */
     uint32_t dilation;      /* of that neighbourhood, receivers; 0: 4 */
     /* Ray origins are lifted along the normal by the largest of `bias` (m), 2^-18 of the size of

@@ -341,7 +341,9 @@ bool pen_trace_visibility(struct pen_trace_scene *scene, const struct pen_trace_
     run.emitter = trace_emitter_of(light);
     run.mode = (run.emitter.emission ? TRACE_COLOUR : 0) |
                (job->weighting == PEN_TRACE_G && !point ? TRACE_WEIGHTS : 0);
-    struct trace_silhouette silhouette = trace_silhouette_of(&run.emitter);
+    struct trace_silhouette silhouette = {.shape = TRACE_BOTH_SIDES};
+    if (job->front_only)
+        silhouette = trace_silhouette_of(&run.emitter);
     uint64_t builds = scene->builds;
     const struct trace_hierarchy *hierarchy = trace_hierarchy_get(scene, &silhouette, error);
     if (!hierarchy)

@@ -134,7 +134,8 @@ static bool compare_hierarchies(
         if (!(cosine > 1e-3f))
             continue;
         asked++;
-        differ += pen_bvh_occluded(&bvh, origin, direction, 0.9999f) == (buffers[2][4 * i + 3] > 0);
+        differ += pen_bvh_occluded(&bvh, false, origin, direction, 0.9999f) ==
+                  (buffers[2][4 * i + 3] > 0);
     }
     printf("%zu of %zu rays answered otherwise than by Embree\n", differ, asked);
     pen_bvh_finish(&bvh);

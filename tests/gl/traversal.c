@@ -19,7 +19,7 @@ static float uniform(float low, float high)
     return low + (high - low) * (float)(random_state >> 8) / (1 << 24);
 }
 
-static GLuint make_program(void)
+static GLuint make_program(bool front_only)
 {
     static const char before[] = "#version 450 core\nlayout(local_size_x = 64) in;\n";
     static const char after[] =
@@ -35,9 +35,9 @@ static GLuint make_program(void)
         "}\n";
     char *walk = gl_program_text("ray_bvh.glsl", NULL);
     CHECK(walk);
-    const char *texts[3] = {before, walk, after};
+    const char *texts[4] = {before, front_only ? "#define FRONT_ONLY\n" : "", walk, after};
     GLuint shader = gl.CreateShader(GL_COMPUTE_SHADER), program = gl.CreateProgram();
-    gl.ShaderSource(shader, 3, texts, NULL);
+    gl.ShaderSource(shader, 4, texts, NULL);
     gl.CompileShader(shader);
     free(walk);
     gl.AttachShader(program, shader);
@@ -102,7 +102,7 @@ static void make_rays(struct ray rays[RAYS])
     }
 }
 
-static void check_shape(GLuint program, enum shape shape, uint32_t count)
+static void check_shape(GLuint program, bool front_only, enum shape shape, uint32_t count)
 {
     static struct pen_bvh_triangle triangles[3000];
     static struct ray rays[RAYS];
@@ -114,7 +114,8 @@ static void check_shape(GLuint program, enum shape shape, uint32_t count)
     CHECK(pen_bvh_build(triangles, count, &bvh, NULL));
     walk(program, &bvh, count ? bvh.node_count : 0, rays, answers);
     for (int i = 0; i < RAYS; i++) {
-        bool hit = pen_bvh_occluded(&bvh, rays[i].origin, rays[i].direction, rays[i].origin[3]);
+        bool hit = pen_bvh_occluded(
+            &bvh, front_only, rays[i].origin, rays[i].direction, rays[i].origin[3]);
         hits += hit;
         wrong += answers[i] != hit;
     }
@@ -152,14 +153,16 @@ int main(void)
         fprintf(stderr, "skipped: %s\n", error.message);
         return 77;
     }
-    GLuint program = make_program();
     static const uint32_t counts[] = {0, 1, 5, 64, 3000};
-    for (enum shape shape = SOUP; shape < SHAPES; shape++)
-        for (size_t k = 0; k < sizeof counts / sizeof *counts; k++)
-            check_shape(program, shape, counts[k]);
-    check_endless(program);
+    for (int front_only = 0; front_only < 2; front_only++) {
+        GLuint program = make_program(front_only);
+        for (enum shape shape = SOUP; shape < SHAPES; shape++)
+            for (size_t k = 0; k < sizeof counts / sizeof *counts; k++)
+                check_shape(program, front_only, shape, counts[k]);
+        check_endless(program);
+        gl.DeleteProgram(program);
+    }
     CHECK(gl.GetError() == GL_NO_ERROR);
-    gl.DeleteProgram(program);
     gl_context_destroy(context);
     CHECK_DONE();
 }

@@ -30,6 +30,43 @@ static bool is_watertight(const struct psc_mesh *mesh)
     return watertight;
 }
 
+static bool is_outward(const struct psc_mesh *mesh)
+{
+    struct psc_scene s;
+    void *data = build_one(mesh, &s);
+    bool outward = s.primitives[0].flags & PSC_OUTWARD;
+    free(data);
+    return outward;
+}
+
+/* Two cubes, either turned inside out; the second far off or within the first. */
+static void outward(void)
+{
+    for (int k = 0; k < 8; k++) {
+        float twice[16][3];
+        uint32_t indices[72];
+        for (int i = 0; i < 16; i++)
+            for (int c = 0; c < 3; c++)
+                twice[i][c] =
+                    cube_positions[i % 8][c] * (i < 8 ? 1 : 0.5f) + (i > 7 && k & 4 ? 1e4f : 0);
+        for (int i = 0; i < 72; i++) {
+            bool turned = k >> (i / 36) & 1;
+            int corner = i % 3;
+            int from = i % 36 - corner + (turned && corner ? 3 - corner : corner);
+            indices[i] = cube_indices[from] + (i < 36 ? 0 : 8);
+        }
+        struct psc_mesh mesh = {.positions = (const float(*)[3])twice,
+            .vertex_count = 16,
+            .indices = indices,
+            .index_count = 72};
+        CHECK(is_watertight(&mesh));
+        CHECK(is_outward(&mesh) == !(k & 3));
+    }
+    struct psc_mesh mesh = cube_mesh();
+    mesh.index_count = 33; /* a hole */
+    CHECK(!is_outward(&mesh));
+}
+
 static void watertight(void)
 {
     struct psc_mesh mesh = cube_mesh();
@@ -317,6 +354,7 @@ int main(void)
 {
     flat_normals_of_a_cube();
     watertight();
+    outward();
     tangents_of_mirrored_strip();
     tangents_of_a_torus();
     meshlet_cones();

@@ -54,7 +54,8 @@ static void check_tree(const struct pen_bvh *bvh)
 }
 
 /* In double precision: 1 hit, 0 miss, -1 too close to call. */
-static int slow_hit(const struct pen_bvh_triangle *t, const float o[3], const float d[3])
+static int slow_hit(
+    bool front_only, const struct pen_bvh_triangle *t, const float o[3], const float d[3])
 {
     double m[3][3], s[3], x[3], determinant = 0;
     for (int c = 0; c < 3; c++) {
@@ -84,7 +85,7 @@ static int slow_hit(const struct pen_bvh_triangle *t, const float o[3], const fl
     if (fabs(margin) < 1e-5 + 2e-6 / size)
         return -1;
     /* The determinant is minus the normal's dot with d: negative when the front faces along d. */
-    return margin > 0 && (determinant < 0 || (t->flags & PEN_BVH_TWO_SIDED));
+    return margin > 0 && (!front_only || determinant < 0 || (t->flags & PEN_BVH_TWO_SIDED));
 }
 
 static void check_rays(const struct pen_bvh *bvh, int rays, float size)
@@ -93,6 +94,7 @@ static void check_rays(const struct pen_bvh *bvh, int rays, float size)
     for (int i = 0; i < rays; i++) {
         float o[3], d[3];
         int truth = 0;
+        bool front_only = i / 3 % 2;
         for (int c = 0; c < 3; c++) {
             o[c] = uniform(-size, size);
             d[c] = uniform(-size, size) - o[c];
@@ -106,10 +108,10 @@ static void check_rays(const struct pen_bvh *bvh, int rays, float size)
         if (i % 8 == 0) /* along an axis: infinite inverses */
             d[i / 8 % 3] = d[(i / 8 + 1) % 3] = 0;
         for (uint32_t k = 0; k < bvh->triangle_count && truth != 1; k++) {
-            int hit = slow_hit(&bvh->triangles[k], o, d);
+            int hit = slow_hit(front_only, &bvh->triangles[k], o, d);
             truth = hit ? hit : truth;
         }
-        bool got = pen_bvh_occluded(bvh, o, d, 1);
+        bool got = pen_bvh_occluded(bvh, front_only, o, d, 1);
         hits += truth == 1;
         close += truth < 0;
         wrong += truth >= 0 && got != truth;
@@ -236,9 +238,10 @@ static void test_scene(void)
     const float x[3] = {0.2f, -5.2f, 5.4f};
     for (int i = 0; i < 3; i++) {
         const float low[3] = {x[i], 0, -0.3f}, high[3] = {x[i], 2, -0.3f};
-        CHECK(pen_bvh_occluded(&bvh, low, up, 1));
-        CHECK(!pen_bvh_occluded(&bvh, low, up, 0.4f));
-        CHECK(pen_bvh_occluded(&bvh, high, down, 1) == (i == 2));
+        CHECK(pen_bvh_occluded(&bvh, true, low, up, 1));
+        CHECK(!pen_bvh_occluded(&bvh, true, low, up, 0.4f));
+        CHECK(pen_bvh_occluded(&bvh, true, high, down, 1) == (i == 2));
+        CHECK(pen_bvh_occluded(&bvh, false, high, down, 1));
     }
     pen_bvh_finish(&bvh);
     CHECK(!pen_bvh_build_scene(&scene, 2, &bvh, &error) && error.code == PEN_TOO_BIG);

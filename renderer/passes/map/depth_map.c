@@ -26,9 +26,10 @@ static bool draw(struct technique_run *run, GLuint framebuffer, uint32_t size,
         return false;
     struct cull_view cull;
     light_face_cull(run->face, sample, rect, &cull);
+    cull.faces = run->request->casters == PEN_CASTERS_FRONT ? CULL_SINGLE_SIDED : CULL_CLOSED;
     if (layer_before) {
         /* Behind the first layer the far sides count too: they close the casters. */
-        cull.cull_back = false;
+        cull.faces = CULL_NONE;
         gl.BindTextureUnit(UNIT_SOURCE, layer_before);
     }
     GLuint programs[] = {pass.opaque, pass.textured};

@@ -3,11 +3,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* What of a face changes a shadow input: everything but the view and the emission. */
+/* What of a face and a request changes a shadow input: everything but the view and the emission. */
 struct face_key {
     mat4 world_to_light;
     float rect[4], half[2], range[2], cone;
     int32_t shape, parallel, cube;
+    uint32_t casters; /* of the request */
 };
 
 struct entry {
@@ -51,7 +52,7 @@ void shadow_cache_destroy(struct shadow_cache *cache)
     free(cache);
 }
 
-static void make_face_key(const struct light_face *face, struct face_key *key)
+static void make_face_key(const struct light_face *face, uint32_t casters, struct face_key *key)
 {
     memset(key, 0, sizeof *key);
     memcpy(key->world_to_light, face->world_to_light, sizeof key->world_to_light);
@@ -60,6 +61,7 @@ static void make_face_key(const struct light_face *face, struct face_key *key)
     key->range[0] = face->near_z, key->range[1] = face->far_z;
     key->cone = face->cone_cos;
     key->shape = face->shape, key->parallel = face->parallel, key->cube = face->cube;
+    key->casters = casters;
 }
 
 const struct shadow_input *shadow_cache_get(struct technique_run *run, const struct shadow_key *key,
@@ -67,7 +69,7 @@ const struct shadow_input *shadow_cache_get(struct technique_run *run, const str
 {
     struct shadow_cache *cache = run->ctx->shadows;
     struct face_key face;
-    make_face_key(run->face, &face);
+    make_face_key(run->face, run->request->casters, &face);
     for (struct entry *e = cache->entries; e; e = e->next)
         if (e->scene == run->scene && e->key.size == key->size && !strcmp(e->key.kind, key->kind) &&
             !memcmp(e->key.extra, key->extra, sizeof key->extra) &&

@@ -36,11 +36,12 @@ static void make_defines(struct work *w)
     bool weights = w->job->weighting == PEN_TRACE_G && !point;
     snprintf(w->defines, sizeof w->defines,
         "#define LIGHT_TYPE %u\n#define PRETEST_NET %uu\n#define PRETEST_RIM %uu\n"
-        "#define DILATION %u\n%s%s%s%s%s",
+        "#define DILATION %u\n%s%s%s%s%s%s",
         w->light.type, TRACE_PRETEST_NET, TRACE_PRETEST_RIM, TRACE_DILATION,
         w->scene->alpha_triangles ? "#define ALPHA\n" : "", textured ? "#define COLOUR\n" : "",
         weights ? "#define WEIGHTS\n" : "", w->pretest ? "" : "#define EVERY\n",
-        weights && textured ? "#define LIT_NEEDS_SUM\n" : "");
+        weights && textured ? "#define LIT_NEEDS_SUM\n" : "",
+        w->run->request->casters == PEN_CASTERS_FRONT ? "#define FRONT_ONLY\n" : "");
 }
 
 static GLuint program(const struct work *w, const char *file, struct pen_error *error)

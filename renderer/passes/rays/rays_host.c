@@ -67,6 +67,7 @@ bool pass_rays_host(struct technique_run *run, const struct ray_job *job, struct
         .samples = job->samples,
         .target_error = job->target_error,
         .weighting = job->weighting,
+        .front_only = run->request->casters == PEN_CASTERS_FRONT,
         .adaptive = job->adaptive,
         .depth_error = RAY_DEPTH_ERROR,
         .seed = job->seed};

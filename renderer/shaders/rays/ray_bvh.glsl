@@ -1,7 +1,7 @@
 // Whether anything casts on a ray: struct pen_bvh of renderer/trace/bvh.h and the walk of
 // pen_bvh_occluded over it. A triangle with alpha is asked through
 //     bool ray_alpha_hit(uint record, vec2 uv)
-// of the includer when ALPHA is defined.
+// of the includer when ALPHA is defined. FRONT_ONLY: casters are asked for by their front.
 #include "bvh.def"
 
 const float BVH_MISS = 3e38;
@@ -17,14 +17,19 @@ float bvh_enter(uint node, vec3 origin, vec3 inverse, float limit)
     return near <= far * 1.0000005 ? near : BVH_MISS; // rounding must not lose a box
 }
 
-// Moeller and Trumbore 1997. A single-sided triangle counts when its front faces along the ray.
+// Moeller and Trumbore 1997. FRONT_ONLY: a single-sided triangle counts when its
+// front faces along the ray.
 bool bvh_hits(uint triangle, vec3 origin, vec3 direction, float limit)
 {
     BvhTriangle t = bvh_triangles[triangle];
     vec3 p = cross(direction, t.edge2), s = origin - t.corner, q = cross(s, t.edge1);
     float determinant = dot(t.edge1, p); // positive when the ray meets the front
-    if (determinant == 0.0 || (determinant > 0.0 && (t.flags & PEN_BVH_TWO_SIDED) == 0u))
+    if (determinant == 0.0)
         return false;
+#ifdef FRONT_ONLY
+    if (determinant > 0.0 && (t.flags & PEN_BVH_TWO_SIDED) == 0u)
+        return false;
+#endif
     float u = dot(s, p) / determinant, v = dot(direction, q) / determinant;
     float at = dot(t.edge2, q) / determinant;
     if (!(u >= 0.0 && v >= 0.0 && u + v <= 1.0 && at > 0.0 && at < limit))

@@ -9,6 +9,7 @@ set -eu
 libraries="
 libcjson-dev
 libcurl4-openssl-dev
+libdraco-dev
 libembree-dev
 libisal-dev
 libmeshoptimizer-dev

@@ -14,7 +14,7 @@ CMAKE = {
     "libcurl": "libcurl4-openssl-dev", "libmicrohttpd": "libmicrohttpd-dev",
     "libcjson": "libcjson-dev", "cjson": "libcjson-dev", "openimageio": "libopenimageio-dev",
     "libisal": "libisal-dev", "libwebp": "libwebp-dev", "libwebpdecoder": "libwebp-dev",
-    "spng": "libspng-dev", "libspng": "libspng-dev", "libutf8proc": "libutf8proc-dev",
+    "spng": "libspng-dev", "libspng": "libspng-dev", "libutf8proc": "libutf8proc-dev", "draco": "libdraco-dev",
     "libturbojpeg": "libturbojpeg0-dev", "turbojpeg": "libturbojpeg0-dev",
     "libseccomp": "libseccomp-dev", "libzip": "libzip-dev", "zlib": "zlib1g-dev",
     "openssl": "libssl-dev", "libssl": "libssl-dev", "libcrypto": "libssl-dev",
@@ -33,7 +33,7 @@ HEADERS = {
     "cglm/*": "libcglm-dev", "meshoptimizer.h": "libmeshoptimizer-dev", "embree[34]/*": "libembree-dev",
     "isa-l.h": "libisal-dev", "isa-l/*": "libisal-dev", "GL/*": "libgl-dev", "EGL/*": "libegl-dev",
     "seccomp.h": "libseccomp-dev", "zip.h": "libzip-dev", "webp/*": "libwebp-dev",
-    "spng.h": "libspng-dev", "utf8proc.h": "libutf8proc-dev", "turbojpeg.h": "libturbojpeg0-dev", "curl/*": "libcurl4-openssl-dev",
+    "spng.h": "libspng-dev", "utf8proc.h": "libutf8proc-dev", "draco/*": "libdraco-dev", "turbojpeg.h": "libturbojpeg0-dev", "curl/*": "libcurl4-openssl-dev",
     "openssl/*": "libssl-dev", "zlib.h": "zlib1g-dev",
 }
 KEYWORDS = set("""REQUIRED QUIET IMPORTED_TARGET GLOBAL STATIC CONFIG MODULE COMPONENTS NO_MODULE

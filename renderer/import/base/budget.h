@@ -26,6 +26,8 @@
 #define IMP_MAX_OPTIMISER_WORK 8000000000ull
 #define IMP_MAX_MESHOPT_BYTES (512ull << 20) /* unpacked, all views together */
 
+#define IMP_MAX_DRACO_BYTES (1024ull << 20) /* unpacked, all attributes together */
+
 #define IMP_MAX_IMAGES 4096u
 #define IMP_MAX_IMAGE_PIXELS (64ull << 20)  /* px, one image */
 #define IMP_MAX_TOTAL_PIXELS (256ull << 20) /* px, all images as uploaded */

@@ -253,7 +253,7 @@ bool imp_document_open(struct imp_document *document, const uint8_t *data, size_
         return false;
     if (!parse(document, json, error) || !imp_extensions_check(document->root, builder, error) ||
         !open_buffers(document, bin, files, name, error) || !open_views(document, builder, error) ||
-        !open_images(document, files, name, error))
+        !imp_document_unpack_draco(document, error) || !open_images(document, files, name, error))
         goto fail;
     document->animation_count = (uint32_t)cJSON_GetArraySize(
         cJSON_GetObjectItemCaseSensitive(document->root, "animations"));

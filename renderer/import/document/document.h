@@ -46,6 +46,9 @@ uint8_t *imp_document_alloc(struct imp_document *document, size_t bytes);
 /* meshopt_views.c: unpacks the views that carry EXT_meshopt_compression into document->views. */
 bool imp_document_unpack_views(struct imp_document *document, struct pen_error *error);
 
+/* draco.c: makes ordinary primitives of those that carry KHR_draco_mesh_compression. */
+bool imp_document_unpack_draco(struct imp_document *document, struct pen_error *error);
+
 /* extensions.c: refuses required extensions that the importer lacks, by name, and warns of used
  * ones that change the picture. */
 bool imp_extensions_check(

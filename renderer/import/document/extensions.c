@@ -16,7 +16,7 @@ static const struct {
     {"EXT_texture_avif", "is not decoded: such textures are drawn by their fallbacks, or plain"},
     {"EXT_texture_webp", ""},
     {"KHR_animation_pointer", ""},
-    {"KHR_draco_mesh_compression", ""}, /* used: the uncompressed accessors are there as well */
+    {"KHR_draco_mesh_compression", ""},
     {"KHR_lights_punctual", ""},
     {"KHR_materials_anisotropy", "is drawn without its direction: highlights are round"},
     {"KHR_materials_clearcoat", "is drawn without its coat"},
@@ -54,18 +54,12 @@ static int find(const char *name)
     return -1;
 }
 
-/* Not drawn though known; the row goes when its time comes. */
-static bool must_be_refused(const char *name)
-{
-    return find(name) < 0 || !strcmp(name, "KHR_draco_mesh_compression");
-}
-
 bool imp_extensions_check(const cJSON *root, struct psc_builder *builder, struct pen_error *error)
 {
     const cJSON *item;
     cJSON_ArrayForEach(item, cJSON_GetObjectItemCaseSensitive(root, "extensionsRequired"))
     {
-        if (must_be_refused(item->valuestring))
+        if (find(item->valuestring) < 0)
             return pen_fail(error, PEN_INVALID, "/extensionsRequired",
                 "The glTF requires the extension %s, which cannot be drawn here. Export it without "
                 "this extension, or convert it, for example with gltf-transform or Blender.",

@@ -70,7 +70,7 @@ static bool check_members(struct walk *walk, cJSON *value, const struct field *f
 {
     uint32_t count = 0;
     for (cJSON *item = value->child; item; item = item->next, count++) {
-        struct step step = {walk->at, field->kind == INDEX_MAP ? item->string : NULL, count};
+        struct step step = {walk->at, value->type == cJSON_Object ? item->string : NULL, count};
         walk->at = &step;
         bool fine = check_member(walk, item, field);
         walk->at = step.up;
@@ -97,6 +97,7 @@ static bool check_value(struct walk *walk, cJSON *value, const struct field *fie
             return bad(walk, "must be an array");
         return check_members(walk, value, field);
     case INDEX_MAP:
+    case UINT_MAP:
         if (!cJSON_IsObject(value))
             return bad(walk, "must be an object");
         return check_members(walk, value, field);

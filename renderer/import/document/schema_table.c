@@ -65,12 +65,17 @@ SCHEMA(accessor,
     {"type", STRING, .required = true},
     OBJ("sparse", sparse));
 
+SCHEMA(draco,
+    {"bufferView", INDEX, .required = true, .into = IN_VIEWS},
+    {"attributes", UINT_MAP, .required = true});
+SCHEMA(primitive_extensions, OBJ("KHR_draco_mesh_compression", draco));
 SCHEMA(primitive,
     {"attributes", INDEX_MAP, .required = true, .into = IN_ACCESSORS},
     {"indices", INDEX, .into = IN_ACCESSORS},
     {"material", INDEX, .into = IN_MATERIALS},
     {"mode", UINT, .max = 6},
-    {"targets", ANYTHING});
+    {"targets", ANYTHING},
+    OBJ("extensions", primitive_extensions));
 SCHEMA(mesh, {"primitives", OBJECTS, .required = true, .schema = &primitive});
 
 SCHEMA(light_use, {"light", INDEX, .required = true, .into = IN_LIGHTS});

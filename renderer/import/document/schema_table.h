@@ -23,6 +23,7 @@ enum field_kind {
     NUMBERS,   /* an array of `max` of them */
     INDICES,   /* an array of INDEX */
     INDEX_MAP, /* an object whose members are INDEX */
+    UINT_MAP,  /* an object whose members are UINT */
     STRING,
     STRINGS,
     BOOL,

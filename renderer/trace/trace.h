@@ -78,12 +78,15 @@ struct pen_trace_job {
     bool front_only;        /* single-sided triangles cast only to their front */
     bool adaptive;          /* all samples only near receivers whose pre-test is mixed */
     uint32_t dilation;      /* of that neighbourhood, receivers; 0: 4 */
-    /* Ray origins are lifted along the normal by the largest of `bias` (m), 2^-18 of the size of
-     * the coordinates (their rounding), and depth_error * distance to `eye`. Positions from a depth
-     * buffer need the last: 0x1p-16f when 32-bit floats hold depths of up to 100 near planes. */
+    /* Ray origins are lifted along the normal by the larger of `bias` (m) and 2^-18 of the size of
+     * the coordinates (their rounding). Positions from a depth buffer err along the way from `eye`,
+     * which is free: they are brought back on it, where no surface that touches theirs can be jumped
+     * over, by the larger of distance * depth_error (0x1p-16f when 32-bit floats hold depths of up to
+     * 100 near planes) and distance * aim_error / cosine. The latter is by how far, as a tangent, the
+     * rasteriser misses the centre of a pixel: beside a seam it shows the other surface's plane. */
     float bias;
     float eye[3];
-    float depth_error;
+    float depth_error, aim_error;
     uint32_t seed;
     uint32_t threads;     /* 0: as many as this process may run on */
     uint64_t deadline_ns; /* CLOCK_MONOTONIC; 0: none */

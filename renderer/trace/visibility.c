@@ -46,13 +46,16 @@ static bool read_receiver(const struct run *run, uint32_t pixel, struct trace_re
     float length = sqrtf(trace_dot(n, n));
     if (!(length > 0) || !isfinite(length + p[0] + p[1] + p[2]))
         return false;
-    float largest = fmaxf(fmaxf(fabsf(p[0]), fabsf(p[1])), fabsf(p[2])), distance2 = 0;
+    float largest = fmaxf(fmaxf(fabsf(p[0]), fabsf(p[1])), fabsf(p[2])), to[3];
     for (int c = 0; c < 3; c++)
-        distance2 += (p[c] - run->job->eye[c]) * (p[c] - run->job->eye[c]);
-    float rounding = 0x1p-18f * fmaxf(largest, 0.25f * run->scene->extent);
-    out->bias = fmaxf(fmaxf(run->job->bias, rounding), run->job->depth_error * sqrtf(distance2));
+        to[c] = run->job->eye[c] - p[c];
+    float distance = sqrtf(trace_dot(to, to)), rounding, pull;
+    float cosine = fmaxf(fabsf(trace_dot(n, to)) / (length * fmaxf(distance, 1e-30f)), 0.1f);
+    rounding = 0x1p-18f * fmaxf(largest, 0.25f * run->scene->extent);
+    out->bias = fmaxf(run->job->bias, rounding);
+    pull = fminf(fmaxf(run->job->depth_error, run->job->aim_error / cosine), 0.5f);
     for (int c = 0; c < 3; c++) {
-        out->position[c] = p[c];
+        out->position[c] = p[c] + pull * to[c];
         out->normal[c] = n[c] / length;
     }
     out->pixel = pixel;

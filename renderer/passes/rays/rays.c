@@ -1,6 +1,7 @@
 /* What both ways of tracing share. */
 #include "renderer/passes/rays/rays.h"
 #include "renderer/passes/draw/screen.h"
+#include <math.h>
 #include <string.h>
 
 void ray_targets_finish(struct ray_targets *t)
@@ -31,6 +32,11 @@ struct pen_trace_light ray_light(const struct technique_run *run)
     memcpy(t.z, light->z, sizeof t.z);
     memcpy(t.half, light->faces[0].extent, sizeof t.half);
     return t;
+}
+
+float ray_aim_error(const struct technique_run *run)
+{
+    return RAY_AIM_ERROR * 2 * tanf(0.5f * run->view->fov_y_rad) / (float)run->height;
 }
 
 bool ray_receivers(struct technique_run *run, struct ray_targets *t, struct pen_error *error)

@@ -4,8 +4,10 @@
 #include "renderer/technique.h"
 #include "renderer/trace/trace.h"
 
-/* Ray origins are lifted by this times the distance to the eye: what a depth buffer rounds. */
+/* See pen_trace_job. */
 #define RAY_DEPTH_ERROR 0x1p-16f
+#define RAY_AIM_ERROR                                                                              \
+    0x1p-7f /* px: corners lie on a grid of 1/256, so edges miss by a step or two */
 
 struct ray_job {
     uint32_t samples;   /* per receiver, at most; rounded up to a power of two */
@@ -28,6 +30,8 @@ void ray_targets_finish(struct ray_targets *targets);
 
 /* The light of run->face in the tracer's terms, without its emission. */
 struct pen_trace_light ray_light(const struct technique_run *run);
+/* RAY_AIM_ERROR as a tangent. */
+float ray_aim_error(const struct technique_run *run);
 /* Fills targets->receivers from the G-buffer. */
 bool ray_receivers(struct technique_run *run, struct ray_targets *targets, struct pen_error *error);
 

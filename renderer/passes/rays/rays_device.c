@@ -88,6 +88,7 @@ static void fill_block(const struct work *w, struct ray_block *b)
     b->eye[3] = RAY_DEPTH_ERROR;
     b->bias[0] = 0x1p-20f * w->scene->extent; /* rounding of coordinates, as on the CPU */
     b->bias[1] = w->job->target_error;
+    b->bias[2] = ray_aim_error(w->run);
 }
 
 static void fill_buffer(GLuint *name, GLsizeiptr bytes, const void *data)

@@ -70,6 +70,7 @@ bool pass_rays_host(struct technique_run *run, const struct ray_job *job, struct
         .front_only = run->request->casters == PEN_CASTERS_FRONT,
         .adaptive = job->adaptive,
         .depth_error = RAY_DEPTH_ERROR,
+        .aim_error = ray_aim_error(run),
         .seed = job->seed};
     memcpy(trace.eye, run->view->eye, sizeof trace.eye);
     bool wants_error = run->variance_framebuffer != 0;

@@ -29,8 +29,7 @@ void face_receiver(vec3 to, inout vec3 a, inout vec3 b)
 float receiver_lift(vec3 p)
 {
     float largest = max(max(abs(p.x), abs(p.y)), abs(p.z));
-    float rounding = max(largest * (1.0 / 262144.0), ray.bias.x);
-    return max(rounding, ray.eye.w * distance(p, ray.eye.xyz));
+    return max(largest * (1.0 / 262144.0), ray.bias.x);
 }
 
 // False when the pixel is no receiver.
@@ -43,6 +42,10 @@ bool load_receiver(ivec2 pixel, uvec4 net, out RayReceiver r)
     if (!(size > 0.0) || isnan(check) || isinf(check))
         return false;
     n /= size;
+    vec3 to = ray.eye.xyz - p;
+    float cosine = max(abs(dot(n, to)) / max(length(to), 1e-30), 0.1);
+    vec3 lift = receiver_lift(p) * n;
+    p += min(max(ray.eye.w, ray.bias.z / cosine), 0.5) * to; // see pen_trace_job
     r.id = trace_hash(uint(pixel.y) * ray.size.x + uint(pixel.x) ^ net.x);
     r.shift = ivec2(r.id & net.y, trace_hash(r.id ^ 0x68bc21ebu) & net.y);
     r.a = ray.a.xyz;
@@ -60,7 +63,6 @@ bool load_receiver(ivec2 pixel, uvec4 net, out RayReceiver r)
     r.cos_b = dot(n, r.b);
     r.reachable =
         away > 0.0 && r.front > 0.0 && !outside && r.cos_base + abs(r.cos_a) + abs(r.cos_b) > 0.0;
-    vec3 lift = receiver_lift(p) * n;
     r.origin = p + lift;
     if (LIGHT_TYPE != PEN_TRACE_SUN)
         r.base -= lift;

@@ -1,7 +1,7 @@
 #include "renderer/import/import.h"
 #include "renderer/import/base/text.h"
 #include "renderer/import/bundle.h"
-#include "renderer/import/convert/context.h"
+#include "renderer/import/convert/convert.h"
 #include "renderer/import/image/image.h"
 #include <stdlib.h>
 #include <string.h>

@@ -1,24 +1,11 @@
+#include "renderer/import/convert/camera.h"
 #include "renderer/blob/affine.h"
 #include "renderer/import/base/budget.h"
-#include "renderer/import/convert/context.h"
+#include "renderer/import/convert/name.h"
 #include <string.h>
 
 #define FAR 1e6             /* m; what requests allow, too */
 #define PARALLEL_FOV_DEG 10 /* of the perspective that stands in for an orthographic camera */
-
-void imp_name(char to[GLTF_NAME_BYTES], const char *preferred, const char *otherwise)
-{
-    const char *from = preferred[0] ? preferred : otherwise;
-    size_t n = strlen(from);
-    if (n > GLTF_NAME_BYTES - 1) {
-        n = GLTF_NAME_BYTES - 1;
-        while (n && ((unsigned char)from[n] & 0xc0) == 0x80)
-            n--; /* not within a UTF-8 sequence */
-    }
-    memset(to, 0, GLTF_NAME_BYTES);
-    for (size_t i = 0; i < n; i++)
-        to[i] = (unsigned char)from[i] < 0x20 || from[i] == 0x7f ? ' ' : from[i];
-}
 
 /* How far ahead of the eye the middle of the scene is; 1 when it is behind, or nowhere. */
 static double focus(const struct imp_context *context, const double eye[3], const double axis[3])

@@ -1,9 +1,10 @@
 /* KHR_lights_punctual and EXT_lights_area. Both are photometric (cd, lux, nits); the renderer is
  * radiometric. 683 lm/W, the efficacy that defines the lumen, converts between them: it is what
  * Blender's exporter multiplies by, so a 100 W lamp comes back as 100 W. */
+#include "renderer/import/convert/light.h"
 #include "renderer/blob/affine.h"
 #include "renderer/import/base/budget.h"
-#include "renderer/import/convert/context.h"
+#include "renderer/import/convert/name.h"
 #include "renderer/import/base/text.h"
 #include <string.h>
 

@@ -1,4 +1,5 @@
-#include "renderer/import/convert/context.h"
+#include "renderer/import/convert/material.h"
+#include "renderer/import/convert/texture.h"
 #include <math.h>
 #include <string.h>
 

@@ -1,8 +1,9 @@
+#include "renderer/import/convert/mesh.h"
 #include "protocol/memory.h"
-#include "renderer/import/convert/accessor.h"
+#include "renderer/import/geometry/accessor.h"
 #include "renderer/import/base/budget.h"
-#include "renderer/import/convert/context.h"
-#include "renderer/import/convert/geometry.h"
+#include "renderer/import/convert/material.h"
+#include "renderer/import/geometry/geometry.h"
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -11,19 +12,6 @@
 enum { TRIANGLES = 4, TRIANGLE_STRIP = 5, TRIANGLE_FAN = 6 };
 
 #define FARTHEST 1e12f /* m, as in the blob */
-
-void imp_geometry_finish(struct imp_geometry *g)
-{
-    free(g->positions);
-    free(g->normals);
-    free(g->tangents);
-    free(g->uv[0]);
-    free(g->uv[1]);
-    free(g->colors);
-    free(g->indices);
-    free(g->meshlet_triangles);
-    memset(g, 0, sizeof *g);
-}
 
 /* Where the corners of a primitive come from. */
 struct corners {

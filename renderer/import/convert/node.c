@@ -1,8 +1,11 @@
+#include "renderer/import/convert/node.h"
 #include "protocol/memory.h"
-#include "renderer/import/convert/accessor.h"
+#include "renderer/import/geometry/accessor.h"
 #include "renderer/blob/affine.h"
 #include "renderer/import/base/budget.h"
-#include "renderer/import/convert/context.h"
+#include "renderer/import/convert/camera.h"
+#include "renderer/import/convert/light.h"
+#include "renderer/import/convert/mesh.h"
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

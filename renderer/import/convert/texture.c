@@ -1,6 +1,6 @@
+#include "renderer/import/convert/texture.h"
 #include "protocol/memory.h"
 #include "renderer/import/base/budget.h"
-#include "renderer/import/convert/context.h"
 #include "renderer/import/image/image.h"
 #include "renderer/import/base/text.h"
 #include <stdio.h>

@@ -277,11 +277,3 @@ void imp_document_finish(struct imp_document *document)
     free(document->owned);
     memset(document, 0, sizeof *document);
 }
-
-uint8_t *imp_document_alloc(struct imp_document *document, size_t bytes)
-{
-    uint8_t *memory = pen_alloc_zero(bytes, 1);
-    document->owned = pen_grow(document->owned, &document->owned_capacity,
-        document->owned_count + 1, sizeof *document->owned);
-    return document->owned[document->owned_count++] = memory;
-}

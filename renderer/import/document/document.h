@@ -40,7 +40,7 @@ bool imp_document_open(struct imp_document *document, const uint8_t *data, size_
     struct pen_error *error);
 void imp_document_finish(struct imp_document *document);
 
-/* Memory that lives as long as the document. */
+/* memory.c: some that lives as long as the document. */
 uint8_t *imp_document_alloc(struct imp_document *document, size_t bytes);
 
 /* meshopt_views.c: unpacks the views that carry EXT_meshopt_compression into document->views. */

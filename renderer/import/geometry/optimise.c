@@ -1,5 +1,5 @@
 #include "protocol/memory.h"
-#include "renderer/import/convert/geometry.h"
+#include "renderer/import/geometry/geometry.h"
 #include <meshoptimizer.h>
 #include <stdlib.h>
 

@@ -1,4 +1,4 @@
-#include "renderer/import/convert/accessor.h"
+#include "renderer/import/geometry/accessor.h"
 #include <stdio.h>
 #include <string.h>
 

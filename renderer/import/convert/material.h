@@ -1,0 +1,7 @@
+#pragma once
+#include "renderer/import/convert/context.h"
+
+/* The psc material of a glTF material (-1: the default one). */
+uint32_t imp_material(struct imp_context *context, int32_t material);
+/* True when it needs tangents. */
+bool imp_material_has_normal_map(const struct imp_context *context, int32_t material);

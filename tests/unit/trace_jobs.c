@@ -1,6 +1,6 @@
 /* Jobs: sample nets, threads, the adaptive mode, stopping, weighting, layouts, refusals; and what a
  * camera sees. */
-#include "renderer/trace/internal.h"
+#include "renderer/trace/embree/internal.h"
 #include "tests/unit/trace_fixture.h"
 
 #define WIDTH 161

@@ -1,4 +1,4 @@
-// Triangles whose alpha decides. What is computed is what renderer/trace/filter.c computes.
+// Triangles whose alpha decides. What is computed is what renderer/trace/embree/filter.c computes.
 #include "ray_alpha.def"
 
 const uint NO_TEXELS = 0xffffffffu;

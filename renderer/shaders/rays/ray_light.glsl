@@ -1,5 +1,5 @@
-// A receiver and the light as it sees it, computed as in renderer/trace/packet.c. LIGHT_TYPE is one
-// of enum pen_trace_light_type.
+// A receiver and the light as it sees it, computed as in renderer/trace/embree/packet.c. LIGHT_TYPE
+// is one of enum pen_trace_light_type.
 #include "lights.def"
 const float RAY_END = 0.9999; // just before the light, which may be a mesh itself
 

@@ -1,6 +1,6 @@
 /* What the files of this folder share. */
 #pragma once
-#include "renderer/trace/embree.h"
+#include "renderer/trace/embree/embree.h"
 #include "renderer/trace/points.h"
 #include "renderer/trace/trace.h"
 #include <stdatomic.h>

@@ -1,6 +1,6 @@
 /* The inner loop of pen_trace_visibility. Compiled with -O3: the lane loops are meant to become
  * vector instructions of whatever the target has. */
-#include "renderer/trace/packet.h"
+#include "renderer/trace/embree/packet.h"
 #include <math.h>
 #include <string.h>
 

@@ -1,5 +1,5 @@
 /* Primary rays, in packets of 4 x 4 pixels. */
-#include "renderer/trace/internal.h"
+#include "renderer/trace/embree/internal.h"
 #include <math.h>
 #include <string.h>
 

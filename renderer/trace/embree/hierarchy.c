@@ -1,6 +1,6 @@
 /* Embree's hierarchies, kept between calls: one for all lights, or one per light where only fronts
  * cast. */
-#include "renderer/trace/internal.h"
+#include "renderer/trace/embree/internal.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

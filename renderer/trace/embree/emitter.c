@@ -1,5 +1,5 @@
 /* From a light as it is asked for to what the inner loop and the hierarchy need. */
-#include "renderer/trace/packet.h"
+#include "renderer/trace/embree/packet.h"
 #include <stdlib.h>
 #include <string.h>
 

@@ -1,12 +1,13 @@
 /* From a blob to triangles in world space. Instances are flattened: one level of hierarchy is
  * faster to traverse than two, and the caller bounds the memory. */
 #include "renderer/trace/casters.h"
-#include "renderer/trace/internal.h"
+#include "renderer/trace/embree/internal.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #define DEFAULT_MAX_BYTES ((uint64_t)4 << 30)
+
 /* What the passes over the instances share. */
 struct build {
     const struct psc_scene *blob;
@@ -25,18 +26,6 @@ static bool count_bytes(void *user, ssize_t bytes, bool after)
         return false;
     }
     return true;
-}
-
-bool trace_check_device(struct pen_trace_scene *scene, struct pen_error *error)
-{
-    enum RTCError code = rtcGetDeviceError(scene->device);
-    if (atomic_load(&scene->over_budget))
-        return pen_fail(error, PEN_TOO_BIG, "/scene",
-            "The scene needs more than %llu MiB to be ray traced.",
-            (unsigned long long)(scene->max_bytes >> 20));
-    if (code == RTC_ERROR_NONE)
-        return true;
-    return pen_fail(error, PEN_INTERNAL, "", "Embree failed with code %d.", (int)code);
 }
 
 /* The alpha channel of an image's finest level, taken out once; false when memory is short. */

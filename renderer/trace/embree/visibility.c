@@ -1,5 +1,5 @@
 /* A job over an image of receivers: tiles, the pre-test, and when to stop. */
-#include "renderer/trace/packet.h"
+#include "renderer/trace/embree/packet.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

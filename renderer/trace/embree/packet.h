@@ -1,6 +1,6 @@
 /* Sixteen receivers against one light: the inner loop. */
 #pragma once
-#include "renderer/trace/internal.h"
+#include "renderer/trace/embree/internal.h"
 
 #define TRACE_LANES 16
 

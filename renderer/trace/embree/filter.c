@@ -1,5 +1,5 @@
 /* Which hits count: facing and alpha. */
-#include "renderer/trace/internal.h"
+#include "renderer/trace/embree/internal.h"
 #include <math.h>
 
 /* Wrapped texel number of texel `i` of `size`. */

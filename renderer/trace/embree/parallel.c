@@ -1,5 +1,5 @@
 /* Threads over numbered items. */
-#include "renderer/trace/internal.h"
+#include "renderer/trace/embree/internal.h"
 #include <pthread.h>
 #include <sched.h>
 #include <time.h>

@@ -7,12 +7,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-void pen_bytes_finish(struct pen_bytes *bytes)
-{
-    free(bytes->data);
-    *bytes = (struct pen_bytes){0};
-}
-
 static uint32_t bits_of(const struct pen_output *output)
 {
     if (output->bit_depth)

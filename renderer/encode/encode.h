@@ -19,13 +19,8 @@
  * One channel is written as grey, three as RGB, four as RGBA; alpha is unassociated and stored
  * unchanged. NaN is written as 0, infinities as the largest finite value of the target. */
 #pragma once
+#include "renderer/encode/bytes.h"
 #include "renderer/picture.h"
-
-struct pen_bytes {
-    uint8_t *data; /* freed with pen_bytes_finish */
-    size_t size;
-};
-void pen_bytes_finish(struct pen_bytes *bytes);
 
 /* Encodes `frame` as output->format asks (bit depth 0: the format's default). `attributes` are
  * written as metadata where the format has any: NUL-terminated "key=value" strings,

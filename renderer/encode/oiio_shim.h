@@ -1,6 +1,7 @@
 /* The part of OpenImageIO that writes files into memory, as C. No exception passes it. */
 #pragma once
-#include "renderer/encode/encode.h"
+#include "renderer/encode/bytes.h"
+#include "renderer/picture.h"
 #include "renderer/encode/pixels.h"
 
 #ifdef __cplusplus

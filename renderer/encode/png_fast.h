@@ -1,6 +1,7 @@
 /* A PNG writer for pictures that are wanted now: one filter, one fast deflate pass. */
 #pragma once
-#include "renderer/encode/encode.h"
+#include "renderer/encode/bytes.h"
+#include "renderer/picture.h"
 
 /* Writes planes[0] as 8 or 16 bits per channel. Errors: PEN_INTERNAL. */
 bool png_fast_encode(const struct pen_frame *frame, uint32_t bit_depth,

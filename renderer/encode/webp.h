@@ -1,7 +1,8 @@
 /* WebP files. Not through OpenImageIO: its writer knows no grey, changes lossless pixels that have
  * alpha, and always runs libwebp's slowest search. */
 #pragma once
-#include "renderer/encode/encode.h"
+#include "renderer/encode/bytes.h"
+#include "renderer/picture.h"
 
 /* Writes planes[0] with 8 bits per channel, lossless at quality 100. Errors: PEN_INTERNAL. */
 bool webp_encode(const struct pen_frame *frame, uint32_t quality, struct pen_bytes *bytes,

@@ -2,6 +2,7 @@
  * y = 0 that is at least as wide as its half-plane casters, so that below a caster no
  * light passes outside. */
 #include "protocol/memory.h"
+#include "renderer/generate/generate.h"
 #include "renderer/generate/model.h"
 #include <math.h>
 

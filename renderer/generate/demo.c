@@ -2,6 +2,7 @@
  * (fence, rings, branches, leaves) and thick ones (columns, arch, globe), near their receivers and
  * far from them; the wall is a second, upright receiver. */
 #include "renderer/generate/demo.h"
+#include "renderer/generate/generate.h"
 #include "renderer/generate/model.h"
 #include "renderer/generate/texture.h"
 #include <math.h>

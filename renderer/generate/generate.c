@@ -58,6 +58,15 @@ static void discard(struct model *model)
     free(model);
 }
 
+/* The blob names its source by a digest; a generated scene has no source file, so its options fill
+ * that place (a digest of nothing that could be uploaded). */
+static void source_of(const struct pen_generated_options *options, uint8_t source[PEN_ID_BYTES])
+{
+    _Static_assert(sizeof *options <= PEN_ID_BYTES, "options fit the source field");
+    memset(source, 0, PEN_ID_BYTES);
+    memcpy(source, options, sizeof *options);
+}
+
 bool pen_generate_blob(const struct pen_generated_options *options, void **data, size_t *bytes,
     struct pen_error *error)
 {
@@ -65,7 +74,9 @@ bool pen_generate_blob(const struct pen_generated_options *options, void **data,
     struct model *model = make(options, &o, error);
     if (!model)
         return false;
-    bool ok = model_to_blob(model, &o, data, bytes, error);
+    uint8_t source[PEN_ID_BYTES];
+    source_of(&o, source);
+    bool ok = model_to_blob(model, source, data, bytes, error);
     discard(model);
     return ok;
 }

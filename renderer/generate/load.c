@@ -1,4 +1,5 @@
 /* Scenes of a wanted size, for benchmarks: hair, leaves, columns. */
+#include "renderer/generate/generate.h"
 #include "renderer/generate/model.h"
 #include "renderer/generate/texture.h"
 #include <math.h>

@@ -76,17 +76,8 @@ void model_look(struct model *model, const double eye[3], const double target[3]
     }
 }
 
-/* The blob names its source by a digest; a generated scene has no source file, so its options fill
- * that place (a digest of nothing that could be uploaded). */
-static void source_of(const struct pen_generated_options *options, uint8_t source[PEN_ID_BYTES])
-{
-    _Static_assert(sizeof *options <= PEN_ID_BYTES, "options fit the source field");
-    memset(source, 0, PEN_ID_BYTES);
-    memcpy(source, options, sizeof *options);
-}
-
-bool model_to_blob(const struct model *model, const struct pen_generated_options *options,
-    void **data, size_t *bytes, struct pen_error *error)
+bool model_to_blob(const struct model *model, const uint8_t source[PEN_ID_BYTES], void **data,
+    size_t *bytes, struct pen_error *error)
 {
     struct psc_builder *builder = psc_builder_create();
     bool ok = true;
@@ -118,8 +109,6 @@ bool model_to_blob(const struct model *model, const struct pen_generated_options
         psc_builder_add_instance(builder, model->instances[i].mesh, model->instances[i].world);
     if (model->camera.fov_y_deg > 0)
         psc_builder_add_camera(builder, &model->camera);
-    uint8_t source[PEN_ID_BYTES];
-    source_of(options, source);
     ok = ok && psc_builder_finish(builder, source, data, bytes, error);
     psc_builder_destroy(builder);
     return ok;

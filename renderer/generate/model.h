@@ -1,6 +1,6 @@
 /* One description of a scene, written out as a blob or as a glTF binary. Private to generate/. */
 #pragma once
-#include "renderer/generate/generate.h"
+#include "renderer/blob/pscene.h"
 #include "renderer/generate/shape.h"
 
 #define MODEL_MAX_MESHES 32
@@ -36,6 +36,8 @@ struct model {
 
 void model_finish(struct model *model);
 
+struct pen_generated_options;
+
 /* A diffuse-and-specular material without textures; linear colour. */
 uint32_t model_material(
     struct model *model, double r, double g, double b, double roughness, double metallic);
@@ -63,6 +65,6 @@ void shape_column(struct shape *shape, double height, double radius, double deta
 /* RGBA8 rows, top first, as an uncompressed PNG; rgb only when every alpha is 255. Caller frees. */
 uint8_t *png_write(const uint8_t *rgba, uint32_t width, uint32_t height, uint64_t *bytes);
 
-bool model_to_blob(const struct model *model, const struct pen_generated_options *options,
-    void **data, size_t *bytes, struct pen_error *error);
+bool model_to_blob(const struct model *model, const uint8_t source[PEN_ID_BYTES], void **data,
+    size_t *bytes, struct pen_error *error);
 bool model_to_glb(const struct model *model, void **data, size_t *bytes, struct pen_error *error);

@@ -270,14 +270,31 @@ struct scene *scene_create_memory(
     return NULL;
 }
 
+void scene_attach(struct scene *scene, struct scene_attachment *attachment)
+{
+    attachment->next = scene->attachments;
+    scene->attachments = attachment;
+    scene->bytes += attachment->bytes;
+}
+
+struct scene_attachment *scene_attachment(
+    const struct scene *scene, void (*destroy)(struct scene_attachment *attachment))
+{
+    struct scene_attachment *a = scene->attachments;
+    while (a && a->destroy != destroy)
+        a = a->next;
+    return a;
+}
+
 void scene_destroy(struct scene *s)
 {
     if (!s)
         return;
-    if (s->trace_free)
-        s->trace_free(s->trace);
-    if (s->rays_free)
-        s->rays_free(s->rays);
+    while (s->attachments) {
+        struct scene_attachment *attachment = s->attachments;
+        s->attachments = attachment->next;
+        attachment->destroy(attachment);
+    }
     GLuint buffers[] = {
         s->positions, s->attributes, s->indices, s->instances, s->materials, s->commands};
     gl.DeleteBuffers(sizeof buffers / sizeof *buffers, buffers);

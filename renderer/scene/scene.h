@@ -21,6 +21,15 @@ struct scene_group {
     bool alpha;  /* MASK or BLEND: fragments may be discarded */
 };
 
+/* What a floor above keeps with a scene until that leaves the GPU: a member of a struct of its own,
+ * which `destroy` frees. */
+struct scene_attachment {
+    struct scene_attachment *next;
+    void (*destroy)(
+        struct scene_attachment *attachment); /* one of each scene: it is the key, too */
+    uint64_t bytes;                           /* of GPU memory; counts as the scene's */
+};
+
 struct scene {
     uint8_t id[PEN_ID_BYTES];
     struct psc_scene blob; /* stays mapped: culling and tracing read it */
@@ -39,10 +48,7 @@ struct scene {
     bool has_gloss; /* some roughness is below 0.5 */
     uint64_t bytes;
     uint64_t last_use;
-    void *trace; /* owned by the tracer when there is one; freed through trace_free */
-    void (*trace_free)(void *);
-    void *rays; /* of passes/rays/ray_scene.c, in GPU memory; freed through rays_free */
-    void (*rays_free)(void *);
+    struct scene_attachment *attachments;
 };
 
 /* Uploads the blob behind `fd`. Errors as psc_open; PEN_INTERNAL out of GPU memory. */
@@ -51,6 +57,11 @@ struct scene *scene_create(const uint8_t id[PEN_ID_BYTES], int fd, struct pen_er
 struct scene *scene_create_memory(
     const uint8_t id[PEN_ID_BYTES], const void *data, size_t bytes, struct pen_error *error);
 void scene_destroy(struct scene *scene);
+
+void scene_attach(struct scene *scene, struct scene_attachment *attachment);
+/* The one that ends with `destroy`; NULL: none. */
+struct scene_attachment *scene_attachment(
+    const struct scene *scene, void (*destroy)(struct scene_attachment *attachment));
 
 bool scene_is_empty(const struct scene *scene);
 /* Of the sphere around the content, m; >= 1e-4. Cameras and lights are chosen to suit it: a floor

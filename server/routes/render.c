@@ -3,7 +3,7 @@
 #include "protocol/json_result.h"
 #include "server/auto/choice.h"
 #include "server/base/clock.h"
-#include "server/base/container.h"
+#include "protocol/container.h"
 #include "server/http/accept.h"
 #include "server/http/query.h"
 #include "server/routes/routes.h"

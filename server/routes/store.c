@@ -1,7 +1,7 @@
 /* Scenes and emission images: uploading, listing, describing, removing. */
 #include "protocol/json_request.h"
 #include "protocol/json_writer.h"
-#include "server/base/container.h"
+#include "protocol/container.h"
 #include "server/http/query.h"
 #include "server/routes/routes.h"
 #include "server/store/describe.h"

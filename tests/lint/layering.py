@@ -4,7 +4,7 @@ import re
 
 import tree
 
-BASICS = ("error", "fnv", "hex", "layer", "limits", "memory", "param", "request", "result", "srgb",
+BASICS = ("container", "error", "fnv", "hex", "layer", "limits", "memory", "param", "request", "result", "srgb",
           "technique_info")
 FLOOR_1 = ["protocol/%s.h" % name for name in BASICS] + ["protocol/*.def"]
 PURE = set("""assert ctype errno fenv float inttypes limits locale math stdalign stdarg stdatomic

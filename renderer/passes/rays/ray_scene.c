@@ -1,12 +1,13 @@
 #include "renderer/passes/rays/ray_scene.h"
+#include "protocol/container.h"
 #include "protocol/memory.h"
 #include "renderer/passes/rays/ray_alpha.h"
 #include <math.h>
 #include <stdlib.h>
 
-static void destroy(void *data)
+static void destroy(struct scene_attachment *attachment)
 {
-    struct ray_scene *s = data;
+    struct ray_scene *s = container_of(attachment, struct ray_scene, attachment);
     GLuint buffers[] = {s->nodes, s->triangles, s->alpha_triangles, s->alpha_words};
     gl.DeleteBuffers(sizeof buffers / sizeof *buffers, buffers);
     free(s);
@@ -51,9 +52,8 @@ static bool upload_all(struct technique_run *run, const struct pen_bvh *bvh,
     }
     s->node_count = bvh->triangle_count ? bvh->node_count : 0;
     s->extent = extent_of(bvh);
-    scene->rays = s;
-    scene->rays_free = destroy;
-    scene->bytes += bytes;
+    s->attachment = (struct scene_attachment){.destroy = destroy, .bytes = bytes};
+    scene_attach(scene, &s->attachment);
     return true;
 }
 
@@ -87,14 +87,14 @@ static bool build(struct technique_run *run, struct pen_error *error)
 
 const struct ray_scene *ray_scene_get(struct technique_run *run, struct pen_error *error)
 {
-    if (!run->scene->rays) {
+    if (!scene_attachment(run->scene, destroy)) {
         gl_timer_begin(&run->ctx->timer, PEN_STAGE_SHADOW, "ray hierarchy");
         bool ok = build(run, error);
         gl_timer_end(&run->ctx->timer);
         if (!ok)
             return NULL;
     }
-    return run->scene->rays;
+    return container_of(scene_attachment(run->scene, destroy), struct ray_scene, attachment);
 }
 
 void ray_scene_bind(const struct ray_scene *s)

@@ -8,6 +8,7 @@
 #include "renderer/shared/rows_c.h"
 
 struct ray_scene {
+    struct scene_attachment attachment;
     GLuint nodes, triangles;             /* ray_bvh.glsl */
     GLuint alpha_triangles, alpha_words; /* ray_alpha.glsl; 0 without alpha */
     uint32_t node_count;                 /* 0: nothing casts */

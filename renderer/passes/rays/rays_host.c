@@ -1,21 +1,36 @@
 /* Rays on the CPU: read the receivers back, trace, upload. */
+#include "protocol/container.h"
 #include "protocol/memory.h"
 #include "renderer/passes/rays/rays.h"
 #include <stdlib.h>
 #include <string.h>
 
-static void free_trace(void *trace)
+/* Embree's scene, in the processor's memory. */
+struct host_scene {
+    struct scene_attachment attachment;
+    struct pen_trace_scene *trace;
+};
+
+static void destroy(struct scene_attachment *attachment)
 {
-    pen_trace_scene_destroy(trace);
+    struct host_scene *s = container_of(attachment, struct host_scene, attachment);
+    pen_trace_scene_destroy(s->trace);
+    free(s);
 }
 
 static struct pen_trace_scene *trace_scene(struct scene *scene, struct pen_error *error)
 {
-    if (!scene->trace) {
-        scene->trace = pen_trace_scene_create(&scene->blob, NULL, error);
-        scene->trace_free = free_trace;
-    }
-    return scene->trace;
+    struct scene_attachment *known = scene_attachment(scene, destroy);
+    if (known)
+        return container_of(known, struct host_scene, attachment)->trace;
+    struct pen_trace_scene *trace = pen_trace_scene_create(&scene->blob, NULL, error);
+    if (!trace)
+        return NULL;
+    struct host_scene *s = pen_alloc_zero(1, sizeof *s);
+    s->attachment.destroy = destroy;
+    s->trace = trace;
+    scene_attach(scene, &s->attachment);
+    return trace;
 }
 
 /* The emission texture as floats; freed by the caller. */

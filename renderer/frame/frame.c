@@ -1,5 +1,6 @@
 #include "renderer/frame/frame.h"
 #include "renderer/frame/layers.h"
+#include "renderer/frame/needs.h"
 #include "renderer/frame/output.h"
 #include "renderer/frame/sky.h"
 #include "renderer/light/meter.h"
@@ -38,9 +39,9 @@ static void fit_targets(struct frame *f)
     const struct pen_request *r = f->job->request;
     frame_output_fit(t, r);
     gl_target_fit(&t->vis, GL_RGBA16F, r->width, r->height, f->light_count ? f->light_count : 1, 1);
-    if (!frame_output_is_direct(r) && frame_output_needs(r, PEN_SOURCE_BEAUTY))
+    if (!frame_output_is_direct(r) && frame_needs(r, PEN_SOURCE_BEAUTY))
         frame_fit_sum(&t->beauty, GL_RGBA32F, r);
-    if (frame_output_needs(r, PEN_SOURCE_VISIBILITY))
+    if (frame_needs(r, PEN_SOURCE_VISIBILITY))
         frame_fit_sum(&t->visibility, GL_RGBA32F, r);
 }
 
@@ -275,13 +276,13 @@ static bool add_visibility(struct frame *f, struct pen_error *error)
 static bool render_jittered(struct frame *f, uint32_t number, struct pen_error *error)
 {
     const struct pen_request *r = f->job->request;
-    bool beauty = frame_output_needs(r, PEN_SOURCE_BEAUTY),
-         visibility = frame_output_needs(r, PEN_SOURCE_VISIBILITY);
+    bool beauty = frame_needs(r, PEN_SOURCE_BEAUTY),
+         visibility = frame_needs(r, PEN_SOURCE_VISIBILITY);
     f->number = number;
     upload_view(f, number);
     return pass_gbuffer(f->job->ctx, f->job->scene, &f->view, r->ground.on,
                &f->job->targets->gbuffer, &f->triangles, error) &&
-           (!frame_output_needs_shadows(r) || record_visibility(f, error)) &&
+           (!frame_needs_shadows(r) || record_visibility(f, error)) &&
            (!beauty || !r->sky.on || sky_occlusion(f->job, error)) &&
            (!beauty || shade(f, error)) && (!visibility || add_visibility(f, error));
 }

@@ -1,5 +1,5 @@
 #include "renderer/frame/layers.h"
-#include "renderer/frame/output.h"
+#include "renderer/frame/needs.h"
 #include "renderer/passes/draw/screen.h"
 #include "renderer/passes/map/classify.h"
 
@@ -8,12 +8,12 @@
 
 bool frame_layers_want_classes(const struct pen_request *r)
 {
-    return frame_output_needs(r, PEN_SOURCE_CLASSES);
+    return frame_needs(r, PEN_SOURCE_CLASSES);
 }
 
 bool frame_layers_want_error(const struct pen_request *r, const struct technique *technique)
 {
-    return technique->estimates_error && frame_output_needs(r, PEN_SOURCE_VARIANCE);
+    return technique->estimates_error && frame_needs(r, PEN_SOURCE_VARIANCE);
 }
 
 void frame_layers_begin(const struct frame_job *job, struct pen_result *result)
@@ -24,7 +24,7 @@ void frame_layers_begin(const struct frame_job *job, struct pen_result *result)
     if (frame_layers_want_classes(r))
         frame_fit_sum(&job->targets->classes, GL_RG16F, r);
     bool estimated = frame_layers_want_error(r, job->technique);
-    bool alone = r->output.layer != PEN_LAYER_ALL && frame_output_needs(r, PEN_SOURCE_VARIANCE);
+    bool alone = r->output.layer != PEN_LAYER_ALL && frame_needs(r, PEN_SOURCE_VARIANCE);
     if (estimated || alone)
         frame_fit_sum(&job->targets->variance, GL_R32F, r);
     if (!estimated && alone)

@@ -7,17 +7,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-bool frame_output_needs(const struct pen_request *r, enum pen_layer_source source)
-{
-    return r->output.layer == PEN_LAYER_ALL || pen_layers[r->output.layer].source == source;
-}
-
-bool frame_output_needs_shadows(const struct pen_request *r)
-{
-    return r->output.layer == PEN_LAYER_ALL ||
-           pen_layers[r->output.layer].source != PEN_SOURCE_GBUFFER;
-}
-
 static enum pen_pixel pixel_of(const struct pen_output *output, uint32_t layer)
 {
     /* Half floats would cut metres to three digits. */

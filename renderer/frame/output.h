@@ -3,10 +3,6 @@
 #include "renderer/frame/job.h"
 #include "renderer/picture.h"
 
-/* A layer of the output is made of that. */
-bool frame_output_needs(const struct pen_request *request, enum pen_layer_source source);
-/* True when the method has to run at all. */
-bool frame_output_needs_shadows(const struct pen_request *request);
 /* True when one 8-bit beauty image of one frame is all that is wanted: shading then resolves. */
 bool frame_output_is_direct(const struct pen_request *request);
 

@@ -1,4 +1,5 @@
 #include "renderer/passes/filter/light_samples.h"
+#include "renderer/techniques/penumbra_params.h"
 
 struct bilateral {
     uint32_t samples;

@@ -1,4 +1,5 @@
 #include "renderer/passes/filter/penumbra.h"
+#include "renderer/techniques/penumbra_params.h"
 
 struct screen_space {
     uint32_t map_size;

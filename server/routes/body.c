@@ -2,7 +2,6 @@
 #include "protocol/memory.h"
 #include "renderer/import/names.h"
 #include "server/http/query.h"
-#include "server/routes/routes.h"
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>

@@ -5,6 +5,8 @@
 #include "server/routes/context.h"
 #include "server/store/upload.h"
 
+#define ROUTES_BUSY_S 2 /* until another upload may find room */
+
 struct call_body {
     char *text; /* not NUL-terminated */
     size_t text_bytes, capacity;

@@ -13,5 +13,3 @@ extern const struct http_callbacks routes_callbacks, routes_admin_callbacks;
 /* Everything that a request refers to must be in the store. */
 bool routes_check_store(
     struct call *call, const struct pen_request *request, struct pen_error *error);
-
-#define ROUTES_BUSY_S 2 /* until another upload may find room */

@@ -3,8 +3,6 @@
 #include "renderer/encode/encode.h"
 #include "server/base/clock.h"
 #include "server/workers/worker_measure.h"
-#include <errno.h>
-#include <fcntl.h>
 #include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -22,38 +20,6 @@ struct worker_encoder {
     pthread_t threads[THREADS];
 };
 
-/* A memfd that nobody can change any more, so that the front end may map it; -1 on failure. */
-static int seal(const struct pen_bytes *bytes)
-{
-    int fd = memfd_create("penumbra-image", MFD_CLOEXEC | MFD_ALLOW_SEALING);
-    if (fd < 0)
-        return -1;
-    for (size_t done = 0; done < bytes->size;) {
-        ssize_t n = write(fd, bytes->data + done, bytes->size - done);
-        if (n < 0 && errno == EINTR)
-            continue;
-        if (n <= 0)
-            goto fail;
-        done += (size_t)n;
-    }
-    if (fcntl(fd, F_ADD_SEALS, F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_WRITE | F_SEAL_SEAL))
-        goto fail;
-    return fd;
-fail:
-    close(fd);
-    return -1;
-}
-
-bool worker_encoder_hand_over(
-    const struct pen_bytes *bytes, struct channel_fds *fds, struct pen_error *error)
-{
-    int fd = seal(bytes);
-    if (fd < 0)
-        return pen_fail(error, PEN_INTERNAL, "", "The image could not be handed over.");
-    fds->fd[fds->count++] = fd;
-    return true;
-}
-
 static bool encode_picture(
     const struct worker_item *item, struct pen_result *result, struct channel_fds *fds)
 {
@@ -68,7 +34,7 @@ static bool encode_picture(
     const char *list[] = {attributes[0], attributes[1], attributes[2], attributes[3]};
     struct pen_bytes bytes = {0};
     bool ok = pen_encode(&item->frame, &item->output, list, 4, &bytes, &result->error) &&
-              worker_encoder_hand_over(&bytes, fds, &result->error);
+              worker_item_hand_over(&bytes, fds, &result->error);
     result->image_bytes = bytes.size;
     pen_bytes_finish(&bytes);
     return ok;

@@ -1,21 +1,6 @@
 /* The encoder threads of penumbra-worker: frames in, answers out. */
 #pragma once
-#include "renderer/renderer.h"
-#include "server/workers/channel.h"
-
-struct worker_item { /* allocated by the caller, freed by the encoder */
-    struct worker_item *next;
-    struct channel_message message; /* CHANNEL_DONE; with an error there is no frame */
-    struct pen_output output;
-    uint32_t measure; /* enum measure */
-    int reference_fd; /* planes to compare with, the item's own; -1: none */
-    struct pen_frame frame;
-};
-
-struct pen_bytes;
-/* Adds the bytes to the answer's descriptors, as a memfd that nobody can change any more. */
-bool worker_encoder_hand_over(
-    const struct pen_bytes *bytes, struct channel_fds *fds, struct pen_error *error);
+#include "server/workers/worker_item.h"
 
 struct worker_encoder;
 struct worker_encoder *worker_encoder_create(int socket);

@@ -110,7 +110,7 @@ static bool hand_over_png(const struct planes *size, const void *values,
     struct pen_frame frame = {size->width, size->height, 1,
         {{.name = "beauty", .pixel = PEN_PIXEL_RGBA8, .channels = 3, .data = data}}};
     bool ok = pen_encode(&frame, &output, NULL, 0, &bytes, error) &&
-              worker_encoder_hand_over(&bytes, fds, error);
+              worker_item_hand_over(&bytes, fds, error);
     if (image_bytes)
         *image_bytes = bytes.size;
     pen_bytes_finish(&bytes);
@@ -208,7 +208,7 @@ bool worker_measure(struct worker_item *item, struct channel_fds *fds)
         goto done;
     if (item->measure == MEASURE_REFERENCE) {
         struct pen_bytes all = {(uint8_t *)header, bytes};
-        ok = worker_encoder_hand_over(&all, fds, error);
+        ok = worker_item_hand_over(&all, fds, error);
         goto done;
     }
     if (item->reference_fd >= 0 && !fstat(item->reference_fd, &status) &&

@@ -1,7 +1,7 @@
 /* Measuring on the worker, where the frames are: a reference's planes go out, and later pictures
  * are compared with them. Runs on the encoder threads. */
 #pragma once
-#include "server/workers/worker_encoder.h"
+#include "server/workers/worker_item.h"
 
 /* What must be rendered to measure: every layer, in float. */
 void worker_measure_output(struct pen_output *output);

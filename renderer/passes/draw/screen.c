@@ -1,6 +1,6 @@
 #include "renderer/passes/draw/screen.h"
 #include "renderer/passes/draw/passes.h"
-#include "renderer/passes/map/classify.h"
+#include "renderer/passes/draw/tiles.h"
 #include <stdio.h>
 
 static void bind_textures(

@@ -1,5 +1,5 @@
 // Some samples for some of the listed receivers; sums are kept between calls. COLOUR sums emission,
-// WEIGHTS weights by G; as renderer/trace/visibility.c does.
+// WEIGHTS weights by G; as renderer/trace/embree/visibility.c does.
 #include "ray_trace.glsl"
 #include "ray_samples.def"
 layout(local_size_x = RAY_GROUP) in;

@@ -1,4 +1,5 @@
-"""Which folder may include what. The first rule whose pattern fits a file decides."""
+"""Which folder may include what. The first rule whose pattern fits a file decides; inside server/ and
+renderer/ includes only go down, floor by floor."""
 import fnmatch
 import re
 
@@ -47,10 +48,31 @@ RULES = [
       "renderer/import/bundle.h", "renderer/import/names.h", "renderer/metrics/*.h"],
      ["cjson/cJSON.h", "curl/*", "zip.h", "openssl/*"], "sockets"),
 ]
-# The floors inside server/, from below; the last are the files directly in it. A file may include
-# what lies in its own folder or on a floor below, not its neighbours on the same floor.
-SERVER_FLOORS = [["base"], ["http", "store", "pages"], ["queue"], ["workers"], ["auto"], ["routes"],
-                 [""]]
+# The floors inside a folder, from below, as patterns of folders or of modules (a path without its
+# ending) in it. A file may include what lies in its own folder or on a floor below, not its
+# neighbours on the same floor.
+FLOORS = {
+    "server": [["base"], ["http", "store", "pages"], ["queue"], ["workers"], ["auto"], ["routes"],
+               [""]],
+    "renderer": [
+        ["device", "picture", "shared", "shaders/*", "metrics", "catalogue/catalogue"],
+        ["blob"],
+        ["gl", "trace", "encode", "generate", "import/base", "import/bundle",
+         "import/draco"],
+        ["trace/embree"],
+        ["import/names"], ["import/files"], ["import/image", "import/document"],
+        ["import/geometry"],
+        ["import/convert"], ["import"],
+        ["scene"], ["light"],
+        ["technique"],
+        ["passes/draw"], ["passes/map", "passes/rays"], ["passes/light"], ["passes/filter"],
+        ["techniques"],
+        ["frame"],
+        ["renderer"],
+        ["catalogue"]],
+}
+MOST_FILES = 20  # directly in a folder of the trees that have floors
+CROWDED = ["renderer/techniques"]  # a file per method, and its shader
 # Tests may look into everything, and compare with other libraries.
 FREE = r"tests/.*"
 # No part of the renderer may know of these, whatever the table says. The importer, a program of its
@@ -71,25 +93,40 @@ def system_allowed(header, kind):
     return name in SYSTEM or name.startswith(("sys/", "linux/", "asm/"))
 
 
-def floor_of(name, tree_name, floors):
-    """Number of the floor and folder, or None for what lies elsewhere."""
-    if not name.startswith(tree_name + "/"):
+def floor_of(name, top):
+    """Number of the floor and what stands for the room there; None for what lies elsewhere."""
+    if not name.startswith(top + "/"):
         return None
-    folder = name[len(tree_name) + 1:].rpartition("/")[0]
-    for number, folders in enumerate(floors):
-        if folder in folders:
-            return number, folder
-    return len(floors), folder
+    module = name[len(top) + 1:].rpartition(".")[0]
+    folder = module.rpartition("/")[0]
+    for room in (module, folder):
+        for number, rooms in enumerate(FLOORS[top]):
+            if fits(room, rooms):
+                return number, room
+    return len(FLOORS[top]), folder
 
 
-def check_floor(name, line, header, tree_name, floors, problems):
-    own, other = (floor_of(n, tree_name, floors) for n in (name, header))
-    if not own or not other:
-        return
-    if len(floors) in (own[0], other[0]):
-        problems.append("%s:%d: %s or %s is on no floor" % (name, line, own[1], other[1]))
-    elif own[1] != other[1] and other[0] >= own[0]:
-        problems.append("%s:%d: %s lies on no floor below" % (name, line, header))
+def check_floor(name, line, header, problems):
+    for top, floors in FLOORS.items():
+        own, other = (floor_of(n, top) for n in (name, header))
+        if not own or not other:
+            continue
+        if len(floors) in (own[0], other[0]):
+            problems.append("%s:%d: %s or %s is on no floor" % (name, line, own[1], other[1]))
+        elif own[1] != other[1] and other[0] >= own[0]:
+            problems.append("%s:%d: %s lies on no floor below" % (name, line, header))
+
+
+def check_rooms(names, problems):
+    rooms = {}
+    for name in names:
+        folder = name.rpartition("/")[0]
+        if name.partition("/")[0] in FLOORS and folder not in CROWDED:
+            rooms.setdefault(folder, []).append(name)
+    for folder, files in sorted(rooms.items()):
+        if len(files) > MOST_FILES:
+            problems.append("%s: %d files directly in it, %d are allowed" %
+                            (folder, len(files), MOST_FILES))
 
 
 def check_include(name, line, quoted, header, problems):
@@ -131,7 +168,8 @@ def main():
             if found[2] == "microhttpd.h" and not name.startswith("tests/"):
                 users_of_microhttpd.add(name)
             check_include(name, number, found[1] == '"', found[2], problems)
-            check_floor(name, number, found[2], "server", SERVER_FLOORS, problems)
+            check_floor(name, number, found[2], problems)
+    check_rooms(tree.files(), problems)
     if len(users_of_microhttpd) > 1:
         problems.append("microhttpd.h is included by more than one file: %s" %
                         ", ".join(sorted(users_of_microhttpd)))

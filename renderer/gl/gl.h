@@ -36,7 +36,8 @@
     F(GETGRAPHICSRESETSTATUS, GetGraphicsResetStatus) F(GETINTEGERV, GetIntegerv) \
     F(GETINTEGER64V, GetInteger64v) \
     F(GETNAMEDBUFFERSUBDATA, GetNamedBufferSubData) F(GETPROGRAMINFOLOG, GetProgramInfoLog) \
-    F(GETPROGRAMIV, GetProgramiv) F(GETQUERYOBJECTUI64V, GetQueryObjectui64v) \
+    F(GETPROGRAMIV, GetProgramiv) F(GETPROGRAMRESOURCEINDEX, GetProgramResourceIndex) \
+    F(GETPROGRAMRESOURCEIV, GetProgramResourceiv) F(GETQUERYOBJECTUI64V, GetQueryObjectui64v) \
     F(GETSHADERINFOLOG, GetShaderInfoLog) F(GETSHADERIV, GetShaderiv) F(GETSTRING, GetString) \
     F(GETSTRINGI, GetStringi) F(GETTEXTUREIMAGE, GetTextureImage) \
     F(GETTEXTURESUBIMAGE, GetTextureSubImage) \

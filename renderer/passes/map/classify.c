@@ -8,6 +8,9 @@
 #define SHARED_ROWS "renderer/shaders/screen/classify.def"
 #include "renderer/shared/rows_c.h"
 
+_Static_assert(TILE_EMPTY == sizeof(((struct pen_result *)0)->class_pixels) / sizeof(uint32_t),
+    "a count for each");
+
 /* Adds up the receivers of each class. Reads 2 bytes per 64 pixels back. */
 static void count_classes(struct technique_run *run, const struct gl_texture *tiles)
 {

@@ -3,7 +3,7 @@
 #include <string.h>
 #include <time.h>
 
-static const char *const type_names[] = {"float", "int", "uint", "flag"};
+static const char *const type_names[] = {"float", "int", "uint", "flag", "double"};
 
 static void write_row(struct pen_json *json, const struct pen_param *row)
 {
@@ -98,8 +98,8 @@ static void write_bounds(struct pen_json *json, const struct pen_scene_info *sce
         return;
     }
     pen_json_object(json, "bounds");
-    pen_json_floats(json, "min", scene->bounds_min, 3);
-    pen_json_floats(json, "max", scene->bounds_max, 3);
+    pen_json_doubles(json, "min", scene->bounds_min, 3);
+    pen_json_doubles(json, "max", scene->bounds_max, 3);
     pen_json_end(json);
 }
 
@@ -126,8 +126,8 @@ void pen_scene_write(struct pen_json *json, const char *key, const struct pen_sc
         pen_json_object(json, NULL);
         pen_json_uint(json, "index", i);
         pen_json_string(json, "name", camera->name);
-        pen_json_floats(json, "eye", camera->eye, 3);
-        pen_json_floats(json, "target", camera->target, 3);
+        pen_json_doubles(json, "eye", camera->eye, 3);
+        pen_json_doubles(json, "target", camera->target, 3);
         pen_json_floats(json, "up", camera->up, 3);
         pen_json_float(json, "fov_y_deg", camera->fov_y_deg);
         pen_json_end(json);

@@ -1,5 +1,6 @@
 #include "protocol/json_writer.h"
 #include "protocol/memory.h"
+#include "protocol/number.h"
 #include "protocol/request.h"
 #include <assert.h>
 #include <math.h>
@@ -136,30 +137,11 @@ void pen_json_string(struct pen_json *json, const char *key, const char *text)
         put_text(json, "null");
 }
 
-void pen_json_print_double(double value, char *text)
-{
-    for (int digits = 15; digits <= 17; digits++) {
-        snprintf(text, 32, "%.*g", digits, value);
-        if (strtod(text, NULL) == value)
-            return;
-    }
-}
-
-void pen_json_print_float(float value, char *text)
-{
-    for (int digits = 6; digits <= 9; digits++) {
-        snprintf(text, 32, "%.*g", digits, (double)value);
-        /* Readers go through a double, so that is what has to come back. */
-        if ((float)strtod(text, NULL) == value)
-            return;
-    }
-}
-
 void pen_json_float(struct pen_json *json, const char *key, float value)
 {
     char text[32] = "null";
     if (isfinite(value))
-        pen_json_print_float(value, text);
+        pen_print_float(value, text);
     pen_json_raw(json, key, text);
 }
 
@@ -167,7 +149,7 @@ void pen_json_double(struct pen_json *json, const char *key, double value)
 {
     char text[32] = "null";
     if (isfinite(value))
-        pen_json_print_double(value, text);
+        pen_print_double(value, text);
     pen_json_raw(json, key, text);
 }
 
@@ -203,6 +185,14 @@ void pen_json_floats(struct pen_json *json, const char *key, const float *values
     pen_json_end(json);
 }
 
+void pen_json_doubles(struct pen_json *json, const char *key, const double *values, uint32_t count)
+{
+    pen_json_array(json, key);
+    for (uint32_t i = 0; i < count; i++)
+        pen_json_double(json, NULL, values[i]);
+    pen_json_end(json);
+}
+
 void pen_json_id(struct pen_json *json, const char *key, const uint8_t *id)
 {
     char text[PEN_ID_HEX + 1];
@@ -219,6 +209,8 @@ static void write_component(
         pen_json_bool(json, key, value != 0);
     else if (row->type == PEN_PARAM_FLOAT)
         pen_json_float(json, key, (float)value);
+    else if (row->type == PEN_PARAM_DOUBLE)
+        pen_json_double(json, key, value);
     else
         pen_json_int(json, key, (int64_t)value);
 }

@@ -26,6 +26,7 @@ void pen_json_uint(struct pen_json *json, const char *key, uint64_t value);
 void pen_json_bool(struct pen_json *json, const char *key, bool value);
 void pen_json_null(struct pen_json *json, const char *key);
 void pen_json_floats(struct pen_json *json, const char *key, const float *values, uint32_t count);
+void pen_json_doubles(struct pen_json *json, const char *key, const double *values, uint32_t count);
 /* 32 bytes as 64 hexadecimal digits. */
 void pen_json_id(struct pen_json *json, const char *key, const uint8_t *id);
 /* `text` must be JSON already. */
@@ -40,7 +41,3 @@ void pen_json_row_default(struct pen_json *json, const char *key, const struct p
 char *pen_json_finish(struct pen_json *json, size_t *bytes);
 /* Throws away what was written. */
 void pen_json_discard(struct pen_json *json);
-
-/* Shortest decimal text that reads back as the same number; `text` holds at least 32 bytes. */
-void pen_json_print_float(float value, char *text);
-void pen_json_print_double(double value, char *text);

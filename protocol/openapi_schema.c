@@ -46,7 +46,7 @@ static void write_component(struct pen_json *json, const struct pen_param *row)
     } else if (row->type == PEN_PARAM_FLAG)
         pen_json_string(json, "type", "boolean");
     else {
-        pen_json_string(json, "type", row->type == PEN_PARAM_FLOAT ? "number" : "integer");
+        pen_json_string(json, "type", pen_param_is_real(row) ? "number" : "integer");
         pen_json_double(json, row->exclusive_min ? "exclusiveMinimum" : "minimum", row->min);
         pen_json_double(json, "maximum", row->max);
     }

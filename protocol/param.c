@@ -6,9 +6,21 @@
 #include <stdlib.h>
 #include <string.h>
 
+bool pen_param_is_real(const struct pen_param *row)
+{
+    return row->type == PEN_PARAM_FLOAT || row->type == PEN_PARAM_DOUBLE;
+}
+
+/* Bytes of one component. */
+static size_t width(const struct pen_param *row)
+{
+    return row->type == PEN_PARAM_DOUBLE ? sizeof(double) : sizeof(float);
+}
+
 static void store(const struct pen_param *row, void *object, uint32_t i, double value)
 {
-    char *at = (char *)object + row->offset + 4 * i;
+    char *at = (char *)object + row->offset + width(row) * i;
+    double d;
     float f;
     int32_t s;
     uint32_t u;
@@ -16,6 +28,10 @@ static void store(const struct pen_param *row, void *object, uint32_t i, double 
     case PEN_PARAM_FLOAT:
         f = (float)value + 0.0f; /* no -0: equal requests have equal bytes */
         memcpy(at, &f, 4);
+        break;
+    case PEN_PARAM_DOUBLE:
+        d = value + 0.0;
+        memcpy(at, &d, 8);
         break;
     case PEN_PARAM_INT:
         s = (int32_t)value;
@@ -29,7 +45,8 @@ static void store(const struct pen_param *row, void *object, uint32_t i, double 
 
 double pen_param_load(const struct pen_param *row, const void *object, uint32_t i)
 {
-    const char *at = (const char *)object + row->offset + 4 * i;
+    const char *at = (const char *)object + row->offset + width(row) * i;
+    double d;
     float f;
     int32_t s;
     uint32_t u;
@@ -37,6 +54,9 @@ double pen_param_load(const struct pen_param *row, const void *object, uint32_t 
     case PEN_PARAM_FLOAT:
         memcpy(&f, at, 4);
         return f;
+    case PEN_PARAM_DOUBLE:
+        memcpy(&d, at, 8);
+        return d;
     case PEN_PARAM_INT:
         memcpy(&s, at, 4);
         return s;
@@ -82,7 +102,7 @@ bool pen_param_store(const struct pen_param *row, void *object, const double *va
         double v = values[i];
         if (!isfinite(v))
             return pen_fail(error, PEN_INVALID, pointer, "%s must be a finite number.", row->name);
-        if (row->type != PEN_PARAM_FLOAT && v != floor(v))
+        if (!pen_param_is_real(row) && v != floor(v))
             return pen_fail(error, PEN_INVALID, pointer, "%s must be a whole number.", row->name);
         /* Compared as they are stored, so that a value that passes here passes again later. */
         double stored = v, low = min, high = max;

@@ -12,10 +12,11 @@ typedef struct {
 } pen_flag;
 
 enum pen_param_type {
-    PEN_PARAM_FLOAT, /* float or float[n] */
-    PEN_PARAM_INT,   /* int32_t */
-    PEN_PARAM_UINT,  /* uint32_t; with .choices an enumeration whose value is the index */
-    PEN_PARAM_FLAG,  /* pen_flag */
+    PEN_PARAM_FLOAT,  /* float or float[n] */
+    PEN_PARAM_INT,    /* int32_t */
+    PEN_PARAM_UINT,   /* uint32_t; with .choices an enumeration whose value is the index */
+    PEN_PARAM_FLAG,   /* pen_flag */
+    PEN_PARAM_DOUBLE, /* double or double[n]: points of the world */
 };
 
 struct pen_param {
@@ -44,21 +45,24 @@ struct pen_param {
 
 #define PEN_PARAM_TYPE_OF(field)                                                                   \
     _Generic((field), float : PEN_PARAM_FLOAT, float * : PEN_PARAM_FLOAT, int32_t : PEN_PARAM_INT, \
-             uint32_t : PEN_PARAM_UINT, pen_flag : PEN_PARAM_FLAG)
+             uint32_t : PEN_PARAM_UINT, pen_flag : PEN_PARAM_FLAG, double : PEN_PARAM_DOUBLE,           \
+             double * : PEN_PARAM_DOUBLE)
+#define PEN_PARAM_COUNT_OF(field)                                                                  \
+    (sizeof(field) / _Generic((field), double : 8, double * : 8, default : 4))
 
 /* PARAM(struct pcss, search_taps, .def = 16, .min = 1, .max = 64, .help = "...") */
 #define PARAM(aggregate, field, ...)                                                               \
     {                                                                                              \
         .name = #field, .offset = offsetof(aggregate, field),                                      \
         .type = PEN_PARAM_TYPE_OF(((aggregate *)0)->field),                                        \
-        .count = sizeof(((aggregate *)0)->field) / 4, __VA_ARGS__                                  \
+        .count = PEN_PARAM_COUNT_OF(((aggregate *)0)->field), __VA_ARGS__                          \
     }
 /* The same with a JSON key that differs from the C field. */
 #define PARAM_AS(aggregate, field, key, ...)                                                       \
     {                                                                                              \
         .name = key, .offset = offsetof(aggregate, field),                                         \
         .type = PEN_PARAM_TYPE_OF(((aggregate *)0)->field),                                        \
-        .count = sizeof(((aggregate *)0)->field) / 4, __VA_ARGS__                                  \
+        .count = PEN_PARAM_COUNT_OF(((aggregate *)0)->field), __VA_ARGS__                          \
     }
 
 struct pen_param_table {
@@ -72,6 +76,9 @@ void pen_params_default(struct pen_param_table table, void *object);
 
 /* True when `row` is automatic and still waits for a value. */
 bool pen_param_is_auto(const struct pen_param *row, const void *object);
+
+/* True when the row takes fractions. */
+bool pen_param_is_real(const struct pen_param *row);
 
 /* The row called `name`, or NULL. */
 const struct pen_param *pen_param_find(struct pen_param_table table, const char *name);

@@ -21,8 +21,6 @@ const char *const pen_priority_names[] = {"interactive", "batch", NULL};
 const char *const pen_pattern_names[] = {
     "two-colour", "checker", "stained-glass", "star", "candle-flame", NULL};
 
-#define FAR 1e6 /* m: single precision still resolves 6 cm there */
-
 static const struct pen_param request_rows[] = {
 #define FIELD(type, name, components, ...) PARAM(struct pen_request, name, __VA_ARGS__),
 #include "protocol/request.def"
@@ -34,10 +32,10 @@ static const struct pen_param request_rows[] = {
 static const struct pen_param camera_rows[] = {
     CAMERA(index, .def = 0, .min = 0, .max = 65535, .applies = PEN_CAMERA_BIT(PEN_CAMERA_INDEX),
         .help = "Camera of the scene, from 0."),
-    CAMERA(eye, .def_v = {0, 0, 1}, .min = -FAR, .max = FAR, .unit = "m", .applies = LOOK_AT,
-        .help = "Position of the eye, world space."),
-    CAMERA(target, .def_v = {0, 0, 0}, .min = -FAR, .max = FAR, .unit = "m", .applies = LOOK_AT,
-        .help = "Point at the centre of the image, world space."),
+    CAMERA(eye, .def_v = {0, 0, 1}, .min = -PEN_FAR, .max = PEN_FAR, .unit = "m",
+        .applies = LOOK_AT, .help = "Position of the eye, world space."),
+    CAMERA(target, .def_v = {0, 0, 0}, .min = -PEN_FAR, .max = PEN_FAR, .unit = "m",
+        .applies = LOOK_AT, .help = "Point at the centre of the image, world space."),
     CAMERA(up, .def_v = {0, 1, 0}, .min = -1, .max = 1, .applies = LOOK_AT,
         .help = "Direction that is up in the image."),
     CAMERA(fov_y_deg, .def = 45, .min = 1, .max = 170, .unit = "deg",
@@ -47,7 +45,7 @@ static const struct pen_param camera_rows[] = {
         .help = "Orbit: angle around +y, from +z towards +x."),
     CAMERA(elevation_deg, .def = 25, .min = -89.9, .max = 89.9, .unit = "deg", .applies = ORBIT,
         .help = "Orbit: angle above the horizon."),
-    CAMERA(distance, .def = 0, .min = 0, .max = FAR, .unit = "m", .applies = ORBIT,
+    CAMERA(distance, .def = 0, .min = 0, .max = PEN_FAR, .unit = "m", .applies = ORBIT,
         .help = "Orbit: distance from the centre of the bounds; 0 frames them."),
 };
 
@@ -57,17 +55,17 @@ static const struct pen_param camera_rows[] = {
 #define PUNCTUAL (PEN_LIGHT_BIT(PEN_LIGHT_POINT) | PEN_LIGHT_BIT(PEN_LIGHT_SPOT))
 #define LIGHT(field, ...) PARAM(struct pen_light, field, __VA_ARGS__)
 static const struct pen_param light_rows[] = {
-    LIGHT(position, .def_v = {0, 3, 0}, .min = -FAR, .max = FAR, .unit = "m",
+    LIGHT(position, .def_v = {0, 3, 0}, .min = -PEN_FAR, .max = PEN_FAR, .unit = "m",
         .help = "Centre of the emitter, world space; for a sun only the direction counts."),
-    LIGHT(target, .def_v = {0, 0, 0}, .min = -FAR, .max = FAR, .unit = "m",
+    LIGHT(target, .def_v = {0, 0, 0}, .min = -PEN_FAR, .max = PEN_FAR, .unit = "m",
         .help = "Point that the emitter faces, world space."),
     LIGHT(up, .def_v = {0, 1, 0}, .min = -1, .max = 1,
         .help = "Orients the emitter: its +y axis is the part of this vector across its axis."),
-    LIGHT(width, .def = 1, .min = 0, .max = 1e4, .exclusive_min = 1, .unit = "m",
+    LIGHT(width, .def = 1, .min = 0, .max = PEN_FAR, .exclusive_min = 1, .unit = "m",
         .applies = PEN_LIGHT_BIT(PEN_LIGHT_RECT), .help = "Extent along the emitter's x axis."),
-    LIGHT(height, .def = 1, .min = 0, .max = 1e4, .exclusive_min = 1, .unit = "m",
+    LIGHT(height, .def = 1, .min = 0, .max = PEN_FAR, .exclusive_min = 1, .unit = "m",
         .applies = PEN_LIGHT_BIT(PEN_LIGHT_RECT), .help = "Extent along the emitter's y axis."),
-    LIGHT(radius, .def = 0.5, .min = 0, .max = 1e4, .exclusive_min = 1, .unit = "m",
+    LIGHT(radius, .def = 0.5, .min = 0, .max = PEN_FAR, .exclusive_min = 1, .unit = "m",
         .applies = ROUND, .help = "Radius of the disk or sphere."),
     LIGHT(angular_diameter_deg, .def = 0.53, .min = 0, .max = 60, .unit = "deg",
         .applies = PEN_LIGHT_BIT(PEN_LIGHT_SUN), .help = "Apparent diameter of the sun."),
@@ -77,7 +75,7 @@ static const struct pen_param light_rows[] = {
         .applies = PEN_LIGHT_BIT(PEN_LIGHT_SPOT),
         .help = "Half angle where intensity reaches zero."),
     LIGHT(color, .def_v = {1, 1, 1}, .max = 1e3, .help = "Linear RGB factor of the emission."),
-    LIGHT(power_w, .def = 100, .min = 0, .max = 1e12, .unit = "W", .applies = EMITTER | PUNCTUAL,
+    LIGHT(power_w, .def = 100, .min = 0, .max = 1e21, .unit = "W", .applies = EMITTER | PUNCTUAL,
         .help = "Radiant flux; 0 uses radiance instead."),
     LIGHT(radiance, .def = 0, .min = 0, .max = 1e9, .unit = "W m^-2 sr^-1", .applies = EMITTER,
         .help = "Emitted radiance, when power_w is 0."),
@@ -161,14 +159,16 @@ static float length3(const float v[3])
     return sqrtf(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
 }
 
-/* An axis and an up vector that is not (nearly) parallel to it. */
-static bool is_frame(const float from[3], const float to[3], const float up[3], bool need_up)
+/* Points that differ by enough for a direction, whatever their distance from the origin, and an up
+ * vector. */
+static bool is_frame(const double from[3], const double to[3], const float up[3])
 {
-    float axis[3] = {to[0] - from[0], to[1] - from[1], to[2] - from[2]};
-    float length = length3(axis);
-    if (!(length > 1e-6f))
-        return false;
-    return !need_up || length3(up) > 1e-3f;
+    double length = 0, size = 0;
+    for (int i = 0; i < 3; i++) {
+        length = fmax(length, fabs(to[i] - from[i]));
+        size = fmax(size, fmax(fabs(from[i]), fabs(to[i])));
+    }
+    return length > 1e-12 * fmax(size, 1) && length3(up) > 1e-3f;
 }
 
 static bool check_rows(struct pen_param_table table, const void *object, uint32_t light_bit,
@@ -213,8 +213,7 @@ bool pen_request_check(const struct pen_request *request, const struct pen_catal
     const struct pen_camera *camera = &request->camera;
     if (camera->mode > PEN_CAMERA_ORBIT)
         return pen_fail(error, PEN_INVALID, "/camera", "Unknown camera mode.");
-    if (camera->mode == PEN_CAMERA_LOOK_AT &&
-        !is_frame(camera->eye, camera->target, camera->up, true))
+    if (camera->mode == PEN_CAMERA_LOOK_AT && !is_frame(camera->eye, camera->target, camera->up))
         return pen_fail(error, PEN_INVALID, "/camera",
             "The camera needs an eye and a target that differ, and an up vector that is not zero.");
     if (request->light_count > PEN_MAX_LIGHTS)
@@ -229,7 +228,7 @@ bool pen_request_check(const struct pen_request *request, const struct pen_catal
         if (!check_rows(pen_light_table(), light, PEN_LIGHT_BIT(light->type), pointer, error))
             return false;
         bool round = light->type == PEN_LIGHT_POINT || light->type == PEN_LIGHT_SPHERE;
-        if (!round && !is_frame(light->position, light->target, light->up, true))
+        if (!round && !is_frame(light->position, light->target, light->up))
             return pen_fail(error, PEN_INVALID, pointer,
                 "The light needs a position and a target that differ, and an up vector.");
         if (light->type == PEN_LIGHT_SPOT && light->inner_cone_deg >= light->outer_cone_deg)

@@ -16,13 +16,13 @@ enum pen_light_type {
 enum pen_light_texture { PEN_TEXTURE_NONE, PEN_TEXTURE_IMAGE, PEN_TEXTURE_PATTERN };
 
 struct pen_light {
-    uint32_t type;     /* enum pen_light_type */
-    float position[3]; /* m, world; the centre of the emitter (sun: only the direction counts) */
-    float target[3];   /* m, world */
-    float up[3];       /* the emitter's +y is the part of `up` across its axis */
-    float width;       /* m */
-    float height;      /* m */
-    float radius;      /* m */
+    double position[3]; /* m, world; the centre of the emitter (sun: only the direction counts) */
+    double target[3];   /* m, world */
+    uint32_t type;      /* enum pen_light_type */
+    float up[3];        /* the emitter's +y is the part of `up` across its axis */
+    float width;        /* m */
+    float height;       /* m */
+    float radius;       /* m */
     float angular_diameter_deg;
     float inner_cone_deg; /* half angles, as in KHR_lights_punctual */
     float outer_cone_deg;
@@ -39,15 +39,15 @@ enum pen_camera_mode { PEN_CAMERA_AUTO, PEN_CAMERA_LOOK_AT, PEN_CAMERA_INDEX, PE
 #define PEN_CAMERA_BIT(m) (1u << (m))
 
 struct pen_camera {
-    uint32_t mode;   /* enum pen_camera_mode */
-    uint32_t index;  /* of the scene's cameras */
-    float eye[3];    /* m, world */
-    float target[3]; /* m, world */
+    double eye[3];    /* m, world */
+    double target[3]; /* m, world */
+    double distance;  /* orbit: m; 0: frames the bounds */
+    uint32_t mode;    /* enum pen_camera_mode */
+    uint32_t index;   /* of the scene's cameras */
     float up[3];
     float fov_y_deg;
     float azimuth_deg; /* orbit: from +z towards +x, around the centre of the bounds */
     float elevation_deg;
-    float distance; /* m; 0: frames the bounds */
 };
 
 enum pen_format { PEN_PNG, PEN_EXR, PEN_JPEG, PEN_WEBP, PEN_TIFF, PEN_FORMATS };
@@ -88,6 +88,9 @@ struct pen_request {
     struct pen_delivery delivery; /* must stay last: see PEN_REQUEST_KEY_BYTES */
 };
 #define PEN_REQUEST_KEY_BYTES offsetof(struct pen_request, delivery)
+
+/* m: points of requests and of files lie within; where one ends, not what is drawn well. */
+#define PEN_FAR 1e9
 
 extern const char *const pen_light_type_names[];
 extern const char *const pen_format_names[];

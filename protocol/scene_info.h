@@ -3,7 +3,8 @@
 #include "protocol/request.h"
 
 struct pen_scene_camera {
-    float eye[3], target[3], up[3]; /* m, world */
+    double eye[3], target[3]; /* m, world */
+    float up[3];
     float fov_y_deg;
     char name[60];
 };
@@ -21,8 +22,8 @@ struct pen_scene_info { /* borrows its arrays */
     int64_t stored_unix_s; /* when it was uploaded; 0: not known */
     uint32_t resident;     /* 1: in GPU memory now */
     uint32_t vertices, primitives, instances, materials, textures, images, animations;
-    uint64_t triangles;                 /* over all instances */
-    float bounds_min[3], bounds_max[3]; /* m, world; min > max: no geometry */
+    uint64_t triangles;                  /* over all instances */
+    double bounds_min[3], bounds_max[3]; /* m, world; min > max: no geometry */
     uint32_t camera_count, light_count;
     const struct pen_scene_camera *cameras;
     const struct pen_scene_light *lights;

@@ -1,5 +1,6 @@
 #include "renderer/blob/builder.h"
 #include "protocol/memory.h"
+#include "renderer/blob/affine.h"
 #include "renderer/blob/check.h"
 #include "renderer/blob/geometry.h"
 #include <float.h>
@@ -16,6 +17,7 @@ struct array {
 
 struct psc_builder {
     struct array sections[PSC_SECTIONS];
+    struct array places; /* double[12] of every instance, in the file's world */
     uint32_t animations;
     uint32_t lost_instances; /* of primitives that do not exist, or with non-finite transforms */
 };
@@ -49,6 +51,7 @@ void psc_builder_destroy(struct psc_builder *builder)
         return;
     for (int i = 0; i < PSC_SECTIONS; i++)
         free(builder->sections[i].data);
+    free(builder->places.data);
     free(builder);
 }
 
@@ -145,6 +148,44 @@ static uint32_t append_meshlets(struct psc_builder *builder, const struct geomet
     return count;
 }
 
+/* Farther off than this many radii, single precision is coarse for what is drawn. */
+#define NEAR_RADII 64
+
+/* Where to count a box's coordinates from: the world's own origin when that is near, else the box's
+ * centre, rounded to about its size, so that equal places mostly give equal origins. */
+static void choose_origin(const double min[3], const double max[3], double origin[3])
+{
+    double away = 0, radius = 0;
+    for (int k = 0; k < 3; k++) {
+        origin[k] = (min[k] + max[k]) / 2;
+        away += origin[k] * origin[k];
+        radius += (max[k] - min[k]) * (max[k] - min[k]) / 4;
+    }
+    away = sqrt(away), radius = sqrt(radius);
+    /* A point's size is nothing: what doubles still hold exactly has to do. */
+    double step = exp2(floor(log2(fmax(radius, away * 0x1p-40))));
+    for (int k = 0; k < 3; k++)
+        origin[k] = away > NEAR_RADII * radius ? nearbyint(origin[k] / step) * step : 0;
+}
+
+static void move_near(struct psc_primitive *p, struct geometry *g)
+{
+    double min[3], max[3], origin[3];
+    for (int k = 0; k < 3; k++) {
+        min[k] = max[k] = g->vertex_count ? g->positions[0][k] : 0;
+        for (uint32_t i = 1; i < g->vertex_count; i++) {
+            min[k] = fmin(min[k], g->positions[i][k]);
+            max[k] = fmax(max[k], g->positions[i][k]);
+        }
+    }
+    choose_origin(min, max, origin);
+    for (int k = 0; k < 3; k++) {
+        p->offset[k] = (float)origin[k];
+        for (uint32_t i = 0; p->offset[k] != 0 && i < g->vertex_count; i++)
+            g->positions[i][k] -= p->offset[k];
+    }
+}
+
 bool psc_builder_add_mesh(struct psc_builder *builder, const struct psc_mesh *mesh,
     uint32_t *primitive, struct pen_error *error)
 {
@@ -164,6 +205,7 @@ bool psc_builder_add_mesh(struct psc_builder *builder, const struct psc_mesh *me
         .vertex_count = g.vertex_count,
         .first_meshlet = (uint32_t)(s[PSC_MESHLETS].bytes / sizeof(struct psc_meshlet)),
         .material = mesh->material};
+    move_near(&p, &g);
     for (uint32_t i = 0; i < g.vertex_count; i++)
         for (int k = 0; k < 3; k++) {
             float x = g.positions[i][k];
@@ -183,19 +225,64 @@ bool psc_builder_add_mesh(struct psc_builder *builder, const struct psc_mesh *me
     return true;
 }
 
-void psc_builder_add_instance(
-    struct psc_builder *builder, uint32_t primitive, const float world[12])
+void psc_builder_place_instance(
+    struct psc_builder *builder, uint32_t primitive, const double world[12])
 {
     size_t primitives = builder->sections[PSC_PRIMITIVES].bytes / sizeof(struct psc_primitive);
-    if (primitive >= primitives || !all_finite(world, 12)) {
+    struct psc_instance instance = {.primitive = primitive};
+    for (int i = 0; i < 12; i++)
+        instance.world[i] = (float)world[i];
+    if (primitive >= primitives || !all_finite(instance.world, 12)) {
         builder->lost_instances++;
         return;
     }
-    struct psc_instance instance = {.primitive = primitive};
-    memcpy(instance.world, world, sizeof instance.world);
-    if (world_determinant(world) < 0)
+    if (world_determinant(instance.world) < 0)
         instance.flags = PSC_MIRRORED;
     append(&builder->sections[PSC_INSTANCES], &instance, sizeof instance);
+    append(&builder->places, world, 12 * sizeof *world);
+}
+
+void psc_builder_add_instance(
+    struct psc_builder *builder, uint32_t primitive, const float world[12])
+{
+    double wide[12];
+    for (int i = 0; i < 12; i++)
+        wide[i] = world[i];
+    psc_builder_place_instance(builder, primitive, wide);
+}
+
+/* Chooses the blob's origin and makes all matrices relative to it, for vertices without their
+ * primitive's offset. */
+static void settle_instances(struct psc_builder *builder, double origin[3])
+{
+    const struct psc_primitive *primitives =
+        (const struct psc_primitive *)builder->sections[PSC_PRIMITIVES].data;
+    struct psc_instance *instances = (struct psc_instance *)builder->sections[PSC_INSTANCES].data;
+    const double(*places)[12] = (const double(*)[12])builder->places.data;
+    size_t count = builder->places.bytes / sizeof *places;
+    double min[3] = {INFINITY, INFINITY, INFINITY}, max[3] = {-INFINITY, -INFINITY, -INFINITY};
+    for (size_t i = 0; i < count; i++) {
+        const struct psc_primitive *p = &primitives[instances[i].primitive];
+        for (int c = 0; p->index_count && c < 8; c++) {
+            double corner[3], at[3];
+            for (int k = 0; k < 3; k++)
+                corner[k] = (double)(c >> k & 1 ? p->bounds_max[k] : p->bounds_min[k]) +
+                            (double)p->offset[k];
+            psc_affine_point(places[i], corner, at);
+            for (int k = 0; k < 3; k++)
+                min[k] = fmin(min[k], at[k]), max[k] = fmax(max[k], at[k]);
+        }
+    }
+    memset(origin, 0, 3 * sizeof *origin);
+    if (min[0] <= max[0])
+        choose_origin(min, max, origin);
+    for (size_t i = 0; i < count; i++) {
+        const float *offset = primitives[instances[i].primitive].offset;
+        double at[3];
+        psc_affine_point(places[i], (double[3]){offset[0], offset[1], offset[2]}, at);
+        for (int k = 0; k < 3; k++)
+            instances[i].world[4 * k + 3] = (float)(at[k] - origin[k]);
+    }
 }
 
 struct psc_material psc_material_default(void)
@@ -275,6 +362,7 @@ bool psc_builder_finish(struct psc_builder *builder, const uint8_t source[PEN_ID
         .header_bytes = sizeof header,
         .animations = builder->animations};
     memcpy(header.source, source, sizeof header.source);
+    settle_instances(builder, header.origin);
     world_bounds(builder, &header);
     if (!all_finite(header.bounds_min, 6))
         return pen_fail(error, PEN_INVALID, "", "The scene's bounds are not finite.");

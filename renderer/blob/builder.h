@@ -43,9 +43,12 @@ void psc_builder_set_animations(struct psc_builder *builder, uint32_t count);
  * than 2^31 indices in total fails with PEN_INVALID. */
 bool psc_builder_add_mesh(struct psc_builder *builder, const struct psc_mesh *mesh,
     uint32_t *primitive, struct pen_error *error);
-/* world: row-major 3x4. */
+/* world: row-major 3x4, of the vertices as they were given. What lies far from the world's origin is
+ * kept relative to one that psc_builder_finish chooses. */
 void psc_builder_add_instance(
     struct psc_builder *builder, uint32_t primitive, const float world[12]);
+void psc_builder_place_instance(
+    struct psc_builder *builder, uint32_t primitive, const double world[12]);
 
 /* A default material: base colour white, roughness 1, metallic 0, no textures. */
 struct psc_material psc_material_default(void);

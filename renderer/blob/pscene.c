@@ -4,16 +4,17 @@
 #include <sys/stat.h>
 
 /* The file format is these structs: a change of layout needs a new PSC_VERSION. */
-_Static_assert(sizeof(struct psc_header) == 96 + 16 * PSC_SECTIONS, "psc_header has padding");
+_Static_assert(sizeof(struct psc_header) == 120 + 16 * PSC_SECTIONS, "psc_header has padding");
 _Static_assert(sizeof(struct psc_attributes) == 36, "psc_attributes has padding");
 _Static_assert(sizeof(struct psc_meshlet) == 40, "psc_meshlet has padding");
-_Static_assert(sizeof(struct psc_primitive) == 56, "psc_primitive has padding");
+_Static_assert(sizeof(struct psc_primitive) == 68, "psc_primitive has padding");
 _Static_assert(sizeof(struct psc_instance) == 56, "psc_instance has padding");
 _Static_assert(sizeof(struct psc_texture) == 16, "psc_texture has padding");
 _Static_assert(sizeof(struct psc_image) == 24, "psc_image has padding");
 _Static_assert(sizeof(struct psc_texture_ref) == 32, "psc_texture_ref has padding");
 _Static_assert(sizeof(struct psc_material) == 232, "psc_material has padding");
-_Static_assert(sizeof(struct psc_camera) == 100, "psc_camera has padding");
+_Static_assert(sizeof(struct psc_camera) == 128, "psc_camera has padding");
+_Static_assert(sizeof(struct psc_light) == sizeof(struct pen_light) + 64, "psc_light has padding");
 _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "the blob is little-endian");
 
 static const uint32_t item_bytes[PSC_SECTIONS] = {
@@ -32,6 +33,11 @@ static const uint32_t item_bytes[PSC_SECTIONS] = {
     [PSC_WARNINGS] = 1,
 };
 
+static bool is_point(const double p[3])
+{
+    return isfinite(p[0]) && isfinite(p[1]) && isfinite(p[2]);
+}
+
 static bool check_header(const struct psc_header *header, size_t bytes, struct pen_error *error)
 {
     if (memcmp(header->magic, PSC_MAGIC, sizeof header->magic))
@@ -40,6 +46,8 @@ static bool check_header(const struct psc_header *header, size_t bytes, struct p
         return DAMAGED(error, "version %u, expected %u.", header->version, PSC_VERSION);
     if (header->header_bytes != sizeof *header || header->reserved)
         return DAMAGED(error, "the header is malformed.");
+    if (!is_point(header->origin))
+        return DAMAGED(error, "the origin is not finite.");
     if (header->file_bytes != bytes)
         return DAMAGED(error, "%llu bytes long, expected %llu.", (unsigned long long)bytes,
             (unsigned long long)header->file_bytes);
@@ -122,8 +130,9 @@ static bool check_views(const struct psc_scene *scene, struct pen_error *error)
         if (light->type >= PEN_LIGHT_TYPES || light->texture > PEN_TEXTURE_PATTERN ||
             light->pattern >= patterns)
             return DAMAGED(error, "a light's kind is unknown.");
-        size_t first = offsetof(struct pen_light, position);
-        if (!all_finite((const char *)light + first,
+        size_t first = offsetof(struct pen_light, up);
+        if (!is_point(light->position) || !is_point(light->target) ||
+            !all_finite((const char *)light + first,
                 (offsetof(struct pen_light, texture) - first) / sizeof(float)))
             return DAMAGED(error, "a light is not finite.");
         if (!memchr(l->name, 0, sizeof l->name))
@@ -131,7 +140,8 @@ static bool check_views(const struct psc_scene *scene, struct pen_error *error)
     }
     for (uint32_t i = 0; i < scene->camera_count; i++) {
         const struct psc_camera *c = &scene->cameras[i];
-        if (!all_finite(c->eye, 10) || !(c->fov_y_deg > 0 && c->fov_y_deg < 180))
+        if (!is_point(c->eye) || !is_point(c->target) || !all_finite(c->up, 3) ||
+            !(c->fov_y_deg > 0 && c->fov_y_deg < 180))
             return DAMAGED(error, "a camera is out of range.");
         if (!memchr(c->name, 0, sizeof c->name))
             return DAMAGED(error, "a camera's name does not end.");

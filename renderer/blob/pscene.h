@@ -8,7 +8,7 @@
 #include <stdint.h>
 
 #define PSC_MAGIC "PSCENE\r\n"
-#define PSC_VERSION 1u
+#define PSC_VERSION 3u
 #define PSC_MESHLET_TRIANGLES 128u /* at most, per meshlet */
 
 enum psc_section_id {
@@ -39,7 +39,9 @@ struct psc_header {
     uint32_t header_bytes; /* sizeof(struct psc_header) */
     uint64_t file_bytes;
     uint8_t source[PEN_ID_BYTES]; /* SHA-256 of the uploaded bytes */
-    float bounds_min[3];          /* world, over all instances; min > max: no geometry */
+    double origin[3]; /* of the world that the blob speaks of, in the file's; 0 unless the scene is
+                         far from the file's origin. Lights and cameras are in the file's. */
+    float bounds_min[3]; /* over all instances; min > max: no geometry */
     float bounds_max[3];
     uint64_t triangles;  /* over all instances */
     uint32_t animations; /* in the source; only the rest pose is kept */
@@ -75,6 +77,9 @@ struct psc_primitive {
     uint32_t material;
     uint32_t flags;
     float bounds_min[3], bounds_max[3]; /* object space */
+    /* What was taken off the file's vertices, because they lie far from their origin; instances'
+     * matrices have it already. */
+    float offset[3];
 };
 
 enum psc_instance_flags { PSC_MIRRORED = 1 }; /* negative determinant: winding is flipped */
@@ -122,14 +127,17 @@ struct psc_material {
 };
 
 struct psc_light {
-    struct pen_light light; /* world space */
+    struct pen_light light; /* the file's world space */
     char name[60];
+    uint32_t reserved;
 };
 
 struct psc_camera {
-    float eye[3], target[3], up[3]; /* world */
+    double eye[3], target[3]; /* the file's world space */
+    float up[3];
     float fov_y_deg;
     char name[60];
+    uint32_t reserved;
 };
 
 /* A mapped, checked blob. Everything points into the mapping; read-only. */

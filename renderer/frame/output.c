@@ -50,6 +50,7 @@ static void make_block(const struct frame_job *job, const struct view *view, str
     for (int i = 0; i < 3; i++) {
         b->bounds_min[i] = empty ? -1 : h->bounds_min[i];
         b->bounds_max[i] = empty ? 1 : h->bounds_max[i];
+        b->origin[i] = (float)h->origin[i];
         distance += (center[i] - view->eye[i]) * view->forward[i];
     }
     b->bounds_min[3] = fmaxf(distance - radius, 0);

@@ -71,8 +71,8 @@ void model_look(struct model *model, const double eye[3], const double target[3]
     model->camera =
         (struct psc_camera){.up = {0, 1, 0}, .fov_y_deg = (float)fov_y_deg, .name = "main"};
     for (int k = 0; k < 3; k++) {
-        model->camera.eye[k] = (float)eye[k];
-        model->camera.target[k] = (float)target[k];
+        model->camera.eye[k] = eye[k];
+        model->camera.target[k] = target[k];
     }
 }
 

@@ -165,9 +165,9 @@ static void fit_range(struct light_face *f, const struct scene *scene)
     geometry_range(f, scene, range);
     if (!(range[1] > 0))
         range[0] = 0.5f, range[1] = 1;
-    f->far_z = range[1] * 1.001f + 1e-6f;
+    f->far_z = range[1] * 1.001f + 1e-6f * fminf(scene_radius(scene), 1);
     /* Nearer casters are kept by depth clamping, at the near plane's depth. */
-    float least = f->parallel ? -INFINITY : fmaxf(f->far_z * 1e-3f, 1e-5f);
+    float least = f->parallel ? -INFINITY : f->far_z * 1e-3f;
     f->near_z = fminf(fmaxf(range[0] * (range[0] > 0 ? 0.999f : 1.001f), least), 0.999f * f->far_z);
 }
 
@@ -334,7 +334,7 @@ static void make_cube(struct light *light, const struct scene *scene)
         init_face(f, light->source);
         f->cube = 1;
         make_axes(axes[i][0], axes[i][1], x, y, z);
-        set_axes(f, light->source->position, x, y, z);
+        set_axes(f, light->origin, x, y, z);
         fit_face(f, light, scene);
     }
 }
@@ -347,13 +347,16 @@ static void make_light(
     set_radiance(light);
     float direction[3], center[3], radius = scene_radius(scene);
     scene_center(scene, center);
-    memcpy(light->origin, source->position, sizeof light->origin);
+    scene_point_in(scene, source->position, light->origin);
     bool round = source->type == PEN_LIGHT_POINT || source->type == PEN_LIGHT_SPHERE;
-    for (int i = 0; i < 3; i++)
-        direction[i] = (round ? center[i] : source->target[i]) - source->position[i];
+    if (round)
+        scene_direction((double[3]){light->origin[0], light->origin[1], light->origin[2]},
+            (double[3]){center[0], center[1], center[2]}, direction);
+    else
+        scene_direction(source->position, source->target, direction);
     if (round) {
         /* One map when all casters lie in a cone of 130 degrees, else a cube. */
-        float distance = glm_vec3_norm(direction);
+        float distance = glm_vec3_distance(center, light->origin);
         if (distance * sinf(glm_rad(65)) < radius) {
             make_axes((float[]){0, -1, 0}, (float[]){0, 0, 1}, light->x, light->y, light->z);
             caster_bounds(scene, light, light->casters);
@@ -377,7 +380,7 @@ static void make_light(
  * lights the centre with PI W m^-2: a white surface that faces it has radiance 1. */
 static void auto_light(struct pen_light *light, const struct scene *scene, const struct view *view)
 {
-    float center[3], back[3], right[3], radius = scene_radius(scene);
+    float center[3], position[3], back[3], right[3], radius = scene_radius(scene);
     pen_light_default(light, PEN_LIGHT_RECT);
     scene_center(scene, center);
     /* On the horizon; looking straight down, what is up in the picture is away from the camera. */
@@ -391,9 +394,10 @@ static void auto_light(struct pen_light *light, const struct scene *scene, const
     for (int i = 0; i < 3; i++) {
         float direction = across * (cosf(azimuth) * back[i] - sinf(azimuth) * right[i]) +
                           (i == 1 ? sinf(elevation) : 0);
-        light->target[i] = center[i];
-        light->position[i] = center[i] + distance * direction;
+        position[i] = center[i] + distance * direction;
     }
+    scene_point_out(scene, center, light->target);
+    scene_point_out(scene, position, light->position);
     light->width = light->height = 1.2f * radius;
     light->power_w = GLM_PIf * GLM_PIf * distance * distance;
 }

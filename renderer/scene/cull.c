@@ -37,7 +37,7 @@ static void to_object(const struct cull_view *view, const struct psc_instance *i
         glm_vec4_scale(out->planes[i], length > 0 ? 1 / length : 1, out->planes[i]);
     }
     out->cone =
-        cull_back && !(instance->flags & PSC_MIRRORED) && fabsf(glm_mat4_det(world)) > 1e-20f;
+        cull_back && !(instance->flags & PSC_MIRRORED) && fabsf(glm_mat4_det(world)) > 1e-30f;
     if (!out->cone)
         return;
     glm_mat4_inv(world, inverse);

@@ -1,5 +1,6 @@
 #include "renderer/scene/scene.h"
 #include "protocol/memory.h"
+#include "protocol/number.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -328,13 +329,36 @@ float scene_radius(const struct scene *s)
         float d = s->content[1][i] - s->content[0][i];
         sum += d * d;
     }
-    return fmaxf(0.5f * sqrtf(sum), 1e-4f);
+    return fmaxf(0.5f * sqrtf(sum), 1e-9f);
 }
 
 void scene_center(const struct scene *s, float center[3])
 {
     for (int i = 0; i < 3; i++)
         center[i] = scene_is_empty(s) ? 0 : 0.5f * (s->content[0][i] + s->content[1][i]);
+}
+
+void scene_point_in(const struct scene *s, const double world[3], float point[3])
+{
+    for (int i = 0; i < 3; i++)
+        point[i] = (float)(world[i] - s->blob.header->origin[i]);
+}
+
+void scene_point_out(const struct scene *s, const float point[3], double world[3])
+{
+    for (int i = 0; i < 3; i++)
+        world[i] = s->blob.header->origin[i] + pen_widen(point[i]);
+}
+
+void scene_direction(const double from[3], const double to[3], float direction[3])
+{
+    double d[3], size = 0;
+    for (int i = 0; i < 3; i++) {
+        d[i] = to[i] - from[i];
+        size = fmax(size, fabs(d[i]));
+    }
+    for (int i = 0; i < 3; i++)
+        direction[i] = size > 0 ? (float)ldexp(d[i], -ilogb(size)) : 0;
 }
 
 /* Vertices transformed for tight bounds, per scene: a few milliseconds' worth. */

@@ -64,10 +64,15 @@ struct scene_attachment *scene_attachment(
     const struct scene *scene, void (*destroy)(struct scene_attachment *attachment));
 
 bool scene_is_empty(const struct scene *scene);
-/* Of the sphere around the content, m; >= 1e-4. Cameras and lights are chosen to suit it: a floor
+/* Of the sphere around the content, m; >= 1e-9. Cameras and lights are chosen to suit it: a floor
  * may be any size. */
 float scene_radius(const struct scene *scene);
 void scene_center(const struct scene *scene, float center[3]);
+/* Points of requests and of the file, and the renderer's, which are relative to the blob's origin. */
+void scene_point_in(const struct scene *scene, const double world[3], float point[3]);
+void scene_point_out(const struct scene *scene, const float point[3], double world[3]);
+/* From one point to another, times some power of two: short or long, its square is a float. */
+void scene_direction(const double from[3], const double to[3], float direction[3]);
 /* World bounds of one instance: tight, but for scenes of so many vertices that its primitive's
  * transformed box has to do. */
 void scene_instance_bounds(

@@ -89,7 +89,7 @@ static struct framing collect(
 
 static void frame_content(struct pen_camera *c, const struct scene *scene, float aspect)
 {
-    float center[3], distance = c->distance, move[2] = {0, 0};
+    float center[3], eye[3], target[3], distance = (float)c->distance, move[2] = {0, 0};
     scene_center(scene, center);
     float azimuth = glm_rad(c->azimuth_deg), elevation = glm_rad(c->elevation_deg);
     float tan_y = FILL * tanf(0.5f * glm_rad(c->fov_y_deg));
@@ -107,9 +107,11 @@ static void frame_content(struct pen_camera *c, const struct scene *scene, float
     if (!(distance > 0))
         distance = 3 * scene_radius(scene);
     for (int i = 0; i < 3; i++) {
-        c->target[i] = center[i] + move[0] * axes[0][i] + move[1] * axes[1][i];
-        c->eye[i] = c->target[i] + distance * axes[2][i];
+        target[i] = center[i] + move[0] * axes[0][i] + move[1] * axes[1][i];
+        eye[i] = target[i] + distance * axes[2][i];
     }
+    scene_point_out(scene, target, c->target);
+    scene_point_out(scene, eye, c->eye);
     c->up[0] = 0, c->up[1] = 1, c->up[2] = 0;
 }
 
@@ -133,9 +135,8 @@ bool view_resolve(struct view *v, struct pen_camera *c, const struct scene *scen
         frame_content(c, scene, v->aspect);
     }
     c->mode = PEN_CAMERA_LOOK_AT;
-    memcpy(v->eye, c->eye, sizeof v->eye);
-    for (int i = 0; i < 3; i++)
-        v->forward[i] = c->target[i] - c->eye[i];
+    scene_point_in(scene, c->eye, v->eye);
+    scene_direction(c->eye, c->target, v->forward);
     glm_vec3_normalize(v->forward);
     glm_vec3_cross(v->forward, c->up, v->right);
     if (glm_vec3_norm(v->right) < 1e-4f * glm_vec3_norm(c->up)) {

@@ -1,4 +1,5 @@
 #include "server/store/describe.h"
+#include "protocol/number.h"
 #include "protocol/json_result.h"
 #include "protocol/memory.h"
 #include "renderer/blob/pscene.h"
@@ -45,8 +46,10 @@ static char *describe_scene(
         .warning_bytes = scene->warning_bytes,
     };
     memcpy(info.id, id, PEN_ID_BYTES);
-    memcpy(info.bounds_min, scene->header->bounds_min, sizeof info.bounds_min);
-    memcpy(info.bounds_max, scene->header->bounds_max, sizeof info.bounds_max);
+    for (int k = 0; k < 3; k++) {
+        info.bounds_min[k] = scene->header->origin[k] + pen_widen(scene->header->bounds_min[k]);
+        info.bounds_max[k] = scene->header->origin[k] + pen_widen(scene->header->bounds_max[k]);
+    }
     struct pen_scene_camera *cameras = pen_alloc_zero(scene->camera_count + 1, sizeof *cameras);
     struct pen_scene_light *lights = pen_alloc_zero(scene->light_count + 1, sizeof *lights);
     for (uint32_t i = 0; i < scene->camera_count; i++) {

@@ -77,7 +77,7 @@ static void named_damage(const char *blob, size_t bytes)
         }                                                                                          \
     } while (0)
     REFUSE_HEADER(x->magic[0] = 'Q');
-    REFUSE_HEADER(x->version = 2);
+    REFUSE_HEADER(x->version = PSC_VERSION + 1);
     REFUSE_HEADER(x->header_bytes--);
     REFUSE_HEADER(x->file_bytes += 64);
     REFUSE_HEADER(x->bounds_max[1] = NAN);

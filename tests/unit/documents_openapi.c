@@ -86,8 +86,7 @@ static void check_row(const struct pen_param *row, const char *where)
         return;
     } else
         CHECK(row->automatic || value->valuedouble == row->def);
-    CHECK_STR(
-        member(one, "type")->valuestring, row->type == PEN_PARAM_FLOAT ? "number" : "integer");
+    CHECK_STR(member(one, "type")->valuestring, pen_param_is_real(row) ? "number" : "integer");
     CHECK_NEAR(
         member(one, row->exclusive_min ? "exclusiveMinimum" : "minimum")->valuedouble, row->min, 0);
     CHECK_NEAR(member(one, "maximum")->valuedouble, row->max, 0);

@@ -62,7 +62,7 @@ static void test_values(void)
                 "\"deadline_ms\":1000,\"priority\":\"batch\"}"));
     CHECK(params().search_taps == 64 && params().offset == -8 && params().bias == 0.1f);
     CHECK(params().tint[2] == 0.125f && params().mode == 2 && params().rotate.on == 0);
-    CHECK(request.camera.mode == PEN_CAMERA_LOOK_AT && request.camera.eye[1] == 1.6f);
+    CHECK(request.camera.mode == PEN_CAMERA_LOOK_AT && request.camera.eye[1] == 1.6);
     CHECK(request.lights_given == 1 && request.light_count == 3);
     CHECK(request.lights[0].height == 2 && request.lights[0].power_w == 100);
     CHECK(request.lights[0].texture == PEN_TEXTURE_PATTERN);
@@ -222,18 +222,18 @@ static uint32_t rows_out_of_range(
         if (row->choices || row->type == PEN_PARAM_FLAG ||
             (applies && row->applies && !(row->applies & applies)))
             continue;
-        double steps[] = {row->min - fmax(1, fabs(row->min)) * 0.01 - (row->type != 0),
-            row->max + fmax(1, fabs(row->max)) * 0.01 + (row->type != 0), -INFINITY, INFINITY, 1.5,
-            row->min};
+        double steps[] = {row->min - fmax(1, fabs(row->min)) * 0.01 - !pen_param_is_real(row),
+            row->max + fmax(1, fabs(row->max)) * 0.01 + !pen_param_is_real(row), -INFINITY,
+            INFINITY, 1.5, row->min};
         for (int side = 0; side < 6; side++) {
             bool fraction = side == 4, lowest = side == 5;
-            if ((fraction && row->type == PEN_PARAM_FLOAT) || (lowest && !row->exclusive_min))
+            if ((fraction && pen_param_is_real(row)) || (lowest && !row->exclusive_min))
                 continue;
             char number[40], value[200] = "", member[320], text[512], at[128];
             snprintf(number, sizeof number, "%.9g",
-                fraction || lowest      ? steps[side]
-                : row->type && side < 2 ? floor(steps[side])
-                                        : steps[side]);
+                fraction || lowest                    ? steps[side]
+                : !pen_param_is_real(row) && side < 2 ? floor(steps[side])
+                                                      : steps[side]);
             if (isinf(steps[side]))
                 strcpy(number, steps[side] < 0 ? "-1e999" : "1e999");
             if (row->count > 1)

@@ -1,5 +1,6 @@
 /* Documents that are sent: requests come back as the same bytes, records and problems parse. */
 #include "protocol/json_request.h"
+#include "protocol/number.h"
 #include "protocol/json_result.h"
 #include "protocol/json_scan.h"
 #include "tests/unit/check.h"
@@ -41,7 +42,7 @@ static void randomise_row(const struct pen_param *row, void *object)
             if (kind > 5) /* small magnitudes: many significant digits after the point */
                 v = fmin(high,
                     fmax(low, (random_unit() - 0.5) * pow(10, -((double)(random_u32() % 9)))));
-            values[i] = row->type == PEN_PARAM_FLOAT ? v : floor(v);
+            values[i] = pen_param_is_real(row) ? v : floor(v);
         }
     } while (!pen_param_store(row, object, values, "", &error));
 }
@@ -118,17 +119,17 @@ static void test_round_trip(void)
 static void test_numbers(void)
 {
     char text[32];
-    pen_json_print_float(0.02f, text);
+    pen_print_float(0.02f, text);
     CHECK_STR(text, "0.02");
-    pen_json_print_float(100, text);
+    pen_print_float(100, text);
     CHECK_STR(text, "100");
-    pen_json_print_float(-2.2f, text);
+    pen_print_float(-2.2f, text);
     CHECK_STR(text, "-2.2");
-    pen_json_print_float(16777216, text);
+    pen_print_float(16777216, text);
     CHECK_STR(text, "16777216");
-    pen_json_print_double(0.1, text);
+    pen_print_double(0.1, text);
     CHECK_STR(text, "0.1");
-    pen_json_print_double(8192, text);
+    pen_print_double(8192, text);
     CHECK_STR(text, "8192");
     for (int n = 0; n < 100000; n++) {
         union {
@@ -137,7 +138,7 @@ static void test_numbers(void)
         } f = {random_u32()};
         if (!isfinite(f.value))
             continue;
-        pen_json_print_float(f.value, text);
+        pen_print_float(f.value, text);
         CHECK((float)strtod(text, NULL) == f.value);
     }
 }

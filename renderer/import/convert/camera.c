@@ -4,7 +4,6 @@
 #include "renderer/import/convert/name.h"
 #include <string.h>
 
-#define FAR 1e6             /* m; what requests allow, too */
 #define PARALLEL_FOV_DEG 10 /* of the perspective that stands in for an orthographic camera */
 
 /* How far ahead of the eye the middle of the scene is; 1 when it is behind, or nowhere. */
@@ -13,7 +12,7 @@ static double focus(const struct imp_context *context, const double eye[3], cons
     double distance = 0;
     for (int i = 0; i < 3; i++)
         distance += ((context->bounds_min[i] + context->bounds_max[i]) / 2 - eye[i]) * axis[i];
-    return context->bounds_min[0] <= context->bounds_max[0] && distance > 1e-3 ? distance : 1;
+    return context->bounds_min[0] <= context->bounds_max[0] && distance > 0 ? distance : 1;
 }
 
 void imp_add_camera(struct imp_context *context, const struct gltf_camera *camera,
@@ -40,14 +39,14 @@ void imp_add_camera(struct imp_context *context, const struct gltf_camera *camer
     }
     if (!(fov > 0))
         fov = 45;
-    distance = fmin(fmax(distance, 1e-3), FAR);
+    distance = fmin(fmax(distance, 1e-9), PEN_FAR);
     for (int i = 0; i < 3; i++) {
-        if (!(fabs(eye[i]) < FAR)) {
-            imp_warn(context, "A camera farther than 1000 km from the origin is left out.");
+        if (!(fabs(eye[i]) < PEN_FAR)) {
+            imp_warn(context, "A camera farther than a million km from the origin is left out.");
             return;
         }
-        to.eye[i] = (float)eye[i];
-        to.target[i] = (float)fmin(fmax(eye[i] + axis[i] * distance, -FAR), FAR);
+        to.eye[i] = eye[i];
+        to.target[i] = fmin(fmax(eye[i] + axis[i] * distance, -PEN_FAR), PEN_FAR);
         to.up[i] = (float)up[i];
     }
     to.fov_y_deg = (float)fmin(fmax(fov, 1), 170);

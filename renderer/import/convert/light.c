@@ -9,7 +9,6 @@
 #include <string.h>
 
 #define LUMENS_PER_WATT 683.0
-#define FAR 1e6       /* m; what requests allow, too */
 #define DIM_CANDELA 5 /* no lamp for a room is this weak: the file must mean something else */
 #define DIM_LUX 20
 
@@ -56,8 +55,8 @@ static bool fill(struct pen_light *to, const struct gltf_light *from, double sca
         pen_light_default(to, from->type == GLTF_LIGHT_RECT ? PEN_LIGHT_RECT : PEN_LIGHT_DISK);
         to->power_w = 0;
         to->radiance = (float)clamp(intensity / LUMENS_PER_WATT, 0, 1e9);
-        to->height = (float)clamp(scale * from->size, 1e-4, 1e4);
-        to->width = (float)clamp(scale * from->size * from->aspect, 1e-4, 1e4);
+        to->height = (float)clamp(scale * from->size, 1e-9, PEN_FAR);
+        to->width = (float)clamp(scale * from->size * from->aspect, 1e-9, PEN_FAR);
         to->radius = to->height / 2;
         return true;
     case GLTF_LIGHT_UNKNOWN:
@@ -87,12 +86,12 @@ void imp_add_light(struct imp_context *context, const struct gltf_light *light,
     for (int i = 0; i < 3; i++) {
         if (sun) /* shines from everywhere along its axis; put it where coordinates are small */
             position[i] = -axis[i];
-        if (!(fabs(position[i]) < FAR)) {
-            imp_warn(context, "A light farther than 1000 km from the origin is left out.");
+        if (!(fabs(position[i]) < PEN_FAR)) {
+            imp_warn(context, "A light farther than a million km from the origin is left out.");
             return;
         }
-        to.light.position[i] = (float)position[i];
-        to.light.target[i] = (float)(sun ? 0 : position[i] + axis[i]);
+        to.light.position[i] = position[i];
+        to.light.target[i] = sun ? 0 : position[i] + axis[i];
         to.light.up[i] = (float)up[i];
         to.light.color[i] = (float)clamp(light->color[i], 0, 1e3);
     }

@@ -101,7 +101,9 @@ static bool check_forest(struct imp_context *context, struct roots *roots, struc
 static void local_matrix(const struct gltf_node *node, double out[12])
 {
     if (!node->has_matrix) {
-        psc_affine_trs(node->translation, node->rotation, node->scale, out);
+        psc_affine_trs((const float[3]){0, 0, 0}, node->rotation, node->scale, out);
+        for (int i = 0; i < 3; i++) /* in full: far from the origin a float is coarse */
+            out[4 * i + 3] = node->translation[i];
         return;
     }
     for (int r = 0; r < 3; r++)
@@ -128,13 +130,10 @@ static bool add_mesh_at(struct imp_context *context, const struct gltf_node *nod
     const double world[12], struct pen_error *error)
 {
     const struct gltf_mesh *mesh = &context->model->meshes[node->mesh];
-    float matrix[12];
-    for (int i = 0; i < 12; i++) {
+    for (int i = 0; i < 12; i++)
         if (!(fabs(world[i]) <= LARGEST))
             return node_fail(
                 error, PEN_INVALID, number, "its place or size in the world is beyond 1e12 m");
-        matrix[i] = (float)world[i];
-    }
     if (mesh->primitive_count > IMP_MAX_INSTANCES - context->instance_count)
         return node_fail(
             error, PEN_TOO_BIG, number, "the scene draws too many instances of its meshes");
@@ -145,7 +144,7 @@ static bool add_mesh_at(struct imp_context *context, const struct gltf_node *nod
             return false;
         if (psc == IMP_SKIPPED)
             continue;
-        psc_builder_add_instance(context->builder, psc, matrix);
+        psc_builder_place_instance(context->builder, psc, world);
         grow_bounds(context, &context->primitive_bounds[mesh->first_primitive + i], world);
     }
     return true;

@@ -64,11 +64,11 @@ void numbers(const tinygltf::Value &object, const char *key, float *out, size_t 
     }
 }
 
-void numbers(const std::vector<double> &from, float *out, size_t count)
+template <typename Number> void numbers(const std::vector<double> &from, Number *out, size_t count)
 {
     if (from.size() == count)
         for (size_t i = 0; i < count; i++)
-            out[i] = static_cast<float>(from[i]);
+            out[i] = static_cast<Number>(from[i]);
 }
 
 std::string string(const tinygltf::Value &object, const char *key)

@@ -36,8 +36,9 @@ struct gltf_mesh {
 
 struct gltf_node {
     bool has_matrix;
-    float matrix[16]; /* column-major */
-    float translation[3], rotation[4], scale[3];
+    double matrix[16]; /* column-major */
+    double translation[3];
+    float rotation[4], scale[3];
     int32_t mesh, camera, light, area_light, skin;
     int32_t instance_translation, instance_rotation, instance_scale; /* accessors */
     bool instanced;                                                  /* EXT_mesh_gpu_instancing */

@@ -70,8 +70,8 @@ vec4 layer_albedo()
 vec4 layer_position()
 {
     vec3 p = surface_position(), size = range.bounds_max.xyz - range.bounds_min.xyz;
-    vec3 shown = clamp((p - range.bounds_min.xyz) / max(size, 1e-6), 0.0, 1.0);
-    return vec4(RAW ? p : hit ? shown : vec3(0.0), 1.0);
+    vec3 shown = clamp((p - range.bounds_min.xyz) / max(size, 1e-20), 0.0, 1.0);
+    return vec4(RAW ? (hit ? p + range.origin.xyz : vec3(0.0)) : hit ? shown : vec3(0.0), 1.0);
 }
 
 vec4 layer_classes()

@@ -235,8 +235,8 @@ static void write_light(struct pen_json *json, const struct pen_light *light)
 {
     pen_json_object(json, "light");
     pen_json_string(json, "type", pen_light_type_names[light->type]);
-    pen_json_floats(json, "position", light->position, 3);
-    pen_json_floats(json, "target", light->target, 3);
+    pen_json_doubles(json, "position", light->position, 3);
+    pen_json_doubles(json, "target", light->target, 3);
     pen_json_float(json, "width", light->width);
     pen_json_float(json, "height", light->height);
     pen_json_float(json, "radius", light->radius);

@@ -98,9 +98,9 @@ class Glb:
 class Blob:
     def __init__(self, data):
         assert data[:8] == b"PSCENE\r\n"
-        self.bounds = struct.unpack("<6f", data[56:80])
-        self.triangles, = struct.unpack("<Q", data[80:88])
-        sections = struct.unpack("<26Q", data[96:96 + 208])
+        self.bounds = struct.unpack("<6f", data[80:104])
+        self.triangles, = struct.unpack("<Q", data[104:112])
+        sections = struct.unpack("<26Q", data[120:120 + 208])
         cut = [data[sections[2 * i]:sections[2 * i] + sections[2 * i + 1]] for i in range(13)]
         self.positions = array("f")
         self.positions.frombytes(cut[0])
@@ -111,13 +111,13 @@ class Blob:
         self.tangents = [cut[1][at + 8:at + 16] != bytes(8) for at in range(0, len(cut[1]), 36)]
         self.indices = array("I")
         self.indices.frombytes(cut[2])
-        self.primitives = [struct.unpack("<8I", cut[4][at:at + 32]) for at in range(0, len(cut[4]), 56)]
+        self.primitives = [struct.unpack("<8I", cut[4][at:at + 32]) for at in range(0, len(cut[4]), 68)]
         self.instances = [struct.unpack("<12fII", cut[5][at:at + 56]) for at in range(0, len(cut[5]), 56)]
         self.materials = [cut[6][at:at + 232] for at in range(0, len(cut[6]), 232)]
         self.textures = [struct.unpack("<4I", cut[7][at:at + 16]) for at in range(0, len(cut[7]), 16)]
         self.images = [struct.unpack("<4IQ", cut[8][at:at + 24]) for at in range(0, len(cut[8]), 24)]
         self.texels = cut[9]
-        self.cameras = [struct.unpack("<10f", cut[11][at:at + 40]) for at in range(0, len(cut[11]), 100)]
+        self.cameras = [struct.unpack("<6d4f", cut[11][at:at + 64]) for at in range(0, len(cut[11]), 128)]
 
 
 def near(a, b, tolerance=1e-6):

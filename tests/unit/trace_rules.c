@@ -312,10 +312,10 @@ static void test_soup(void)
         trace(scene, &light, &job, r);
         double squares = 0, most = 0;
         for (int i = 0; i < 64; i++) {
-            int number = i * 63, hit = 0, tries = 2500;
+            int number = i * 63, hit = 0, tries = 6400; /* their own noise: 0.006 at most */
             double p[3] = {(double)r->positions[number][0], 0, (double)r->positions[number][2]};
             for (int t = 0; t < tries; t++) {
-                double x = (t % 50 + uniform(0, 1)) / 50, y = (t / 50 + uniform(0, 1)) / 50;
+                double x = (t % 80 + uniform(0, 1)) / 80, y = (t / 80 + uniform(0, 1)) / 80;
                 double u = k == 2 ? sqrt(x) * cos(2 * M_PI * y) : 2 * x - 1;
                 double v = k == 2 ? sqrt(x) * sin(2 * M_PI * y) : 2 * y - 1;
                 double l[3] = {u, (double)light.origin[1], v};

@@ -91,7 +91,8 @@ static bool read_vector(
     struct reader *reader, const struct pen_param *row, const cJSON *node, double *values)
 {
     if (!cJSON_IsArray(node) || cJSON_GetArraySize(node) != row->count)
-        return REFUSE(reader, "%s must be an array of %u numbers.", row->name, row->count);
+        return REFUSE(reader, "%s must be an array of %u numbers%s%s.", row->name, row->count,
+            row->word ? " or " : "", row->word ? row->word : "");
     int i = 0;
     for (const cJSON *item = node->child; item; item = item->next, i++) {
         size_t before = push_index(reader, i);
@@ -106,6 +107,8 @@ static bool read_row(
     struct reader *reader, const struct pen_param *row, const cJSON *node, void *base)
 {
     double values[4] = {0};
+    if (cJSON_IsString(node) && pen_param_store_word(row, base, node->valuestring))
+        return true;
     if (row->choices) {
         if (!cJSON_IsString(node))
             return REFUSE(reader, "%s must be a string.", row->name);
@@ -117,7 +120,8 @@ static bool read_row(
         return pen_param_parse(row, base, node->valuestring, reader->pointer, reader->error);
     else if (row->type == PEN_PARAM_FLAG) {
         if (!cJSON_IsBool(node))
-            return REFUSE(reader, "%s must be true or false.", row->name);
+            return REFUSE(reader, "%s must be true%s false%s%s.", row->name,
+                row->word ? "," : " or", row->word ? " or " : "", row->word ? row->word : "");
         values[0] = cJSON_IsTrue(node);
     } else if (row->count > 1) {
         if (!read_vector(reader, row, node, values))

@@ -233,6 +233,10 @@ void pen_json_row(struct pen_json *json, const struct pen_param *row, const void
     double values[4];
     if (pen_param_is_auto(row, object))
         return;
+    if (pen_param_is_word(row, object)) {
+        pen_json_string(json, row->name, row->word);
+        return;
+    }
     for (uint32_t i = 0; i < row->count; i++)
         values[i] = pen_param_load(row, object, i);
     write_components(json, row->name, row, values);

@@ -52,10 +52,8 @@ static void write_component(struct pen_json *json, const struct pen_param *row)
     }
 }
 
-static void write_row(struct pen_json *json, const struct pen_param *row)
+static void write_value(struct pen_json *json, const struct pen_param *row)
 {
-    char description[2048]; /* a layer more is a sentence more */
-    pen_json_object(json, row->name);
     if (row->count > 1) {
         pen_json_string(json, "type", "array");
         pen_json_object(json, "items");
@@ -65,6 +63,25 @@ static void write_row(struct pen_json *json, const struct pen_param *row)
         pen_json_uint(json, "maxItems", row->count);
     } else
         write_component(json, row);
+}
+
+static void write_row(struct pen_json *json, const struct pen_param *row)
+{
+    char description[2048]; /* a layer more is a sentence more */
+    pen_json_object(json, row->name);
+    if (row->word) {
+        const char *const words[] = {row->word, NULL};
+        pen_json_array(json, "anyOf");
+        pen_json_object(json, NULL);
+        write_value(json, row);
+        pen_json_end(json);
+        pen_json_object(json, NULL);
+        pen_json_string(json, "type", "string");
+        write_strings(json, "enum", words);
+        pen_json_end(json);
+        pen_json_end(json);
+    } else
+        write_value(json, row);
     pen_json_row_default(json, "default", row);
     snprintf(description, sizeof description, row->unit ? "%s Unit: %s." : "%s", row->help,
         row->unit ? row->unit : "");

@@ -79,6 +79,21 @@ bool pen_param_is_auto(const struct pen_param *row, const void *object)
     return row->automatic && pen_param_load(row, object, 0) == PEN_AUTO;
 }
 
+bool pen_param_is_word(const struct pen_param *row, const void *object)
+{
+    double word = row->type == PEN_PARAM_FLAG ? PEN_FLAG_WORD : PEN_WORD;
+    return row->word && pen_param_load(row, object, 0) == word;
+}
+
+bool pen_param_store_word(const struct pen_param *row, void *object, const char *text)
+{
+    if (!row->word || strcmp(row->word, text) != 0)
+        return false;
+    for (uint32_t i = 0; i < row->count; i++)
+        store(row, object, i, row->type == PEN_PARAM_FLAG ? PEN_FLAG_WORD : PEN_WORD);
+    return true;
+}
+
 const struct pen_param *pen_param_find(struct pen_param_table table, const char *name)
 {
     for (uint32_t r = 0; r < table.count; r++)
@@ -121,6 +136,8 @@ bool pen_param_parse(const struct pen_param *row, void *object, const char *text
     const char *pointer, struct pen_error *error)
 {
     double values[4] = {0};
+    if (pen_param_store_word(row, object, text))
+        return true;
     if (row->choices) {
         int index = pen_choice_index(row->choices, text);
         if (index < 0)
@@ -131,7 +148,8 @@ bool pen_param_parse(const struct pen_param *row, void *object, const char *text
         if (!strcmp(text, "1") || !strcmp(text, "on") || !strcmp(text, "true"))
             values[0] = 1;
         else if (strcmp(text, "0") && strcmp(text, "off") && strcmp(text, "false"))
-            return pen_fail(error, PEN_INVALID, pointer, "%s must be true or false.", row->name);
+            return pen_fail(error, PEN_INVALID, pointer, "%s must be true%s false%s%s.", row->name,
+                row->word ? "," : " or", row->word ? " or " : "", row->word ? row->word : "");
     } else {
         const char *at = text;
         for (uint32_t i = 0; i < row->count; i++) {
@@ -142,8 +160,9 @@ bool pen_param_parse(const struct pen_param *row, void *object, const char *text
             /* strtod also takes hexadecimal floats and leading space: neither is a number here. */
             if (end == at || *end != (last ? '\0' : ',') ||
                 strspn(at, "+-.0123456789eE") < (size_t)(end - at))
-                return pen_fail(error, PEN_INVALID, pointer, "%s must be %u number%s.", row->name,
-                    row->count, row->count > 1 ? "s separated by commas" : "");
+                return pen_fail(error, PEN_INVALID, pointer, "%s must be %u number%s%s%s.",
+                    row->name, row->count, row->count > 1 ? "s separated by commas" : "",
+                    row->word ? " or " : "", row->word ? row->word : "");
             at = end + 1;
         }
     }

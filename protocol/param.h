@@ -38,10 +38,14 @@ struct pen_param {
     uint8_t exclusive_min; /* 1: min itself is not allowed */
     uint8_t automatic; /* 1: left out, it holds PEN_AUTO until something that suits is chosen; def
                           is what such a choice starts from */
+    const char *word;  /* may be given instead of numbers, or of true and false; NULL: none */
 };
 
 /* What every component of an automatic row (of floats) holds while nobody has given a value. */
 #define PEN_AUTO (-3.402823466e38f)
+/* What every component of a row of floats holds while its word is given, and what a flag does. */
+#define PEN_WORD (-3.4e38f)
+#define PEN_FLAG_WORD 2
 
 #define PEN_PARAM_TYPE_OF(field)                                                                   \
     _Generic((field), float : PEN_PARAM_FLOAT, float * : PEN_PARAM_FLOAT, int32_t : PEN_PARAM_INT, \
@@ -79,6 +83,12 @@ bool pen_param_is_auto(const struct pen_param *row, const void *object);
 
 /* True when the row takes fractions. */
 bool pen_param_is_real(const struct pen_param *row);
+
+/* True when `row` holds its word. */
+bool pen_param_is_word(const struct pen_param *row, const void *object);
+
+/* Stores the row's word when `text` is it; false otherwise. */
+bool pen_param_store_word(const struct pen_param *row, void *object, const char *text);
 
 /* The row called `name`, or NULL. */
 const struct pen_param *pen_param_find(struct pen_param_table table, const char *name);

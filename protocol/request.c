@@ -177,7 +177,7 @@ static bool check_rows(struct pen_param_table table, const void *object, uint32_
     for (uint32_t r = 0; r < table.count; r++) {
         const struct pen_param *row = &table.rows[r];
         if ((row->applies && light_bit && !(row->applies & light_bit)) ||
-            pen_param_is_auto(row, object))
+            pen_param_is_auto(row, object) || pen_param_is_word(row, object))
             continue;
         double values[4];
         uint32_t scratch[128]; /* only the range check is wanted, not the store */
@@ -250,10 +250,19 @@ bool pen_request_check(const struct pen_request *request, const struct pen_catal
     if (!depth_ok)
         return pen_fail(error, PEN_INVALID, "/output/bit_depth",
             "%s cannot have %u bits per channel.", pen_format_names[output->format], bits);
+    if (output->layer == PEN_LAYER_BEAUTY && output->format == PEN_JPEG &&
+        pen_request_is_transparent(request))
+        return pen_fail(error, PEN_INVALID, "/output/format",
+            "jpeg has no transparency: ask for png, webp, tiff or exr, or name a background.");
     if (output->layer == PEN_LAYER_ALL && output->format != PEN_EXR)
         return pen_fail(
             error, PEN_INVALID, "/output/layer", "All layers in one file need the exr format.");
     return true;
+}
+
+bool pen_request_is_transparent(const struct pen_request *request)
+{
+    return request->background[0] == PEN_WORD;
 }
 
 void pen_id_to_hex(const uint8_t id[PEN_ID_BYTES], char text[PEN_ID_HEX + 1])

@@ -115,6 +115,9 @@ void pen_request_default(struct pen_request *request, const struct pen_catalogue
 /* Every default of one light of `type`. */
 void pen_light_default(struct pen_light *light, enum pen_light_type type);
 
+/* True when the picture has an alpha channel: how much of a pixel the scene covers. */
+bool pen_request_is_transparent(const struct pen_request *request);
+
 /* Checks what no single row can: pixel budget, layer against format, light against emitter size,
  * degenerate camera, known technique. Errors: PEN_INVALID with a pointer. A worker calls it
  * too: it trusts no message. */

@@ -71,7 +71,7 @@ static cJSON *row_value(
         args->status = cli_fail(CLI_USAGE, "%s: %s", flag, error.message);
         return NULL;
     }
-    if (row->choices)
+    if (row->choices || pen_param_is_word(row, &scratch))
         return cJSON_CreateString(text);
     if (row->type == PEN_PARAM_FLAG)
         return cJSON_CreateBool(pen_param_load(row, &scratch, 0) != 0);
@@ -238,12 +238,14 @@ static void print_row(const struct row_set *set, const struct pen_param *row)
     char name[64], usage[160], range[160] = "";
     flag_name(set, row, name);
     if (row->type == PEN_PARAM_FLAG)
-        snprintf(usage, sizeof usage, "--%s, --no-%s", name, name);
+        snprintf(usage, sizeof usage, row->word ? "--%s[=%s], --no-%s" : "--%s, %s--no-%s", name,
+            row->word ? row->word : "", name);
     else
-        snprintf(usage, sizeof usage, "--%s %s", name,
+        snprintf(usage, sizeof usage, "--%s %s%s%s", name,
             row->choices      ? "NAME"
             : row->count == 3 ? "X,Y,Z"
-                              : "N");
+                              : "N",
+            row->word ? "|" : "", row->word ? row->word : "");
     if (row->choices)
         for (int i = 0; row->choices[i]; i++)
             snprintf(range + strlen(range), sizeof range - strlen(range), "%s%s",

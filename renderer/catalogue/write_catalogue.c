@@ -6,7 +6,7 @@
 #include <stdlib.h>
 
 /* A new field must be written here too. */
-_Static_assert(sizeof(struct pen_param) == 96, "write_param");
+_Static_assert(sizeof(struct pen_param) == 104, "write_param");
 _Static_assert(sizeof(struct pen_technique_info) == 88, "main");
 
 static void write_text(const char *text)
@@ -54,6 +54,8 @@ static void write_param(const struct pen_param *row)
     write_text(row->unit);
     printf(", .choices = ");
     write_list(row->choices);
+    printf(", .word = ");
+    write_text(row->word);
     printf(", .def_v = {");
     for (int i = 0; i < 4; i++) {
         write_number(row->def_v[i]);

@@ -70,6 +70,7 @@ static bool encode_exr(const struct pen_frame *frame, const struct pen_output *o
         bool wide = output->bit_depth == 32 ||
                     (output->bit_depth == 0 && plane->pixel == PEN_PIXEL_RGBA32F);
         source.channels[p] = plane->channels;
+        file->bt709 |= !strcmp(plane->name, pen_layers[PEN_LAYER_BEAUTY].name);
         source.stored[p] = wide ? PIXELS_FLOAT : PIXELS_HALF;
         name_channels(plane, plane->channels, frame->plane_count > 1, &file->names[source.total]);
         for (uint32_t c = 0; c < plane->channels; c++)

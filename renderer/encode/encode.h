@@ -16,8 +16,11 @@
  *   depth.Z
  *   <plane>.Y            one channel
  *
- * One channel is written as grey, three as RGB, four as RGBA; alpha is unassociated and stored
- * unchanged. NaN is written as 0, infinities as the largest finite value of the target. */
+ * PNG of the beauty plane says that it is sRGB, EXR that its primaries are those of BT.709.
+ *
+ * One channel is written as grey, three as RGB, four as RGBA; alpha is stored unchanged, and colours
+ * as they are: a plane for a file of integers holds them not multiplied by alpha, one for EXR
+ * multiplied, as each format's readers expect. NaN is written as 0, infinities as the largest finite value of the target. */
 #pragma once
 #include "renderer/encode/bytes.h"
 #include "renderer/picture.h"

@@ -66,6 +66,10 @@ void describe(const struct oiio_file *file, OIIO::ImageSpec &spec)
     /* After the caller's, so that none of these can be overridden by a key. */
     spec.attribute(
         "oiio:UnassociatedAlpha", 1); /* alpha is data here: never multiplied or divided */
+    if (file->bt709) {                /* red, green, blue, white */
+        static const float xy[8] = {0.64f, 0.33f, 0.3f, 0.6f, 0.15f, 0.06f, 0.3127f, 0.329f};
+        spec.attribute("chromaticities", OIIO::TypeDesc(OIIO::TypeDesc::FLOAT, 8), xy);
+    }
     /* The writers add the current time where there is none; a value that is no text
      * keeps it out. */
     void *none = nullptr;

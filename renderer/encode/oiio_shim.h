@@ -20,6 +20,7 @@ struct oiio_file {
     const char *const *attributes;                /* "key=value" */
     uint32_t attribute_count;
     bool attributes_as_description; /* one text instead of one attribute each */
+    bool bt709;                     /* EXR: says that R, G and B are those of BT.709 */
 };
 
 /* Asks for rows [first, first + count): interleaved samples, channels * width per row. */

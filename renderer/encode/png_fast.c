@@ -128,6 +128,27 @@ static void swap_to_big_endian(uint8_t *row, size_t bytes)
     }
 }
 
+/* sRGB (IEC 61966-2-1), and for readers that do not know the name the gamma and the chromaticities
+ * that PNG lists for it. Layers that are data say nothing. */
+static void put_colour(struct out *out)
+{
+    static const uint32_t chromaticities[8] = {
+        31270, 32900, 64000, 33000, 30000, 60000, 15000, 6000};
+    uint8_t numbers[32];
+    size_t chunk = chunk_begin(out, "gAMA");
+    put_u32(numbers, 45455);
+    out_bytes(out, numbers, 4);
+    chunk_end(out, chunk);
+    chunk = chunk_begin(out, "cHRM");
+    for (int i = 0; i < 8; i++)
+        put_u32(numbers + 4 * i, chromaticities[i]);
+    out_bytes(out, numbers, sizeof numbers);
+    chunk_end(out, chunk);
+    chunk = chunk_begin(out, "sRGB");
+    out_bytes(out, "\0", 1); /* perceptual */
+    chunk_end(out, chunk);
+}
+
 static bool put_pixels(struct out *out, const struct pen_frame *frame, uint32_t bit_depth)
 {
     const struct pen_plane *plane = &frame->planes[0];
@@ -188,6 +209,8 @@ bool png_fast_encode(const struct pen_frame *frame, uint32_t bit_depth,
     size_t chunk = chunk_begin(&out, "IHDR");
     out_bytes(&out, header, sizeof header);
     chunk_end(&out, chunk);
+    if (!strcmp(frame->planes[0].name, pen_layers[PEN_LAYER_BEAUTY].name))
+        put_colour(&out);
     for (uint32_t i = 0; i < attribute_count; i++)
         put_text(&out, attributes[i]);
     chunk = chunk_begin(&out, "IDAT");

@@ -59,7 +59,7 @@ static void upload_view(struct frame *f, uint32_t number)
     b.viewport[0] = (float)r->width, b.viewport[1] = (float)r->height;
     b.viewport[2] = 1 / b.viewport[0], b.viewport[3] = 1 / b.viewport[1];
     memcpy(b.ambient, r->ambient, 12);
-    if (r->background[0] != PEN_AUTO)
+    if (r->background[0] != PEN_AUTO && !pen_request_is_transparent(r))
         memcpy(b.background, r->background, 12);
     memcpy(b.ground_albedo, r->ground_albedo, 12);
     float center[3], radius = scene_radius(f->job->scene);
@@ -204,6 +204,7 @@ static void make_shade_block(const struct frame *f, struct shade_block *b)
         scale3(b->lights[i].half_y, l->y, face->extent[1], cosf(glm_rad(s->inner_cone_deg)));
         scale3(b->lights[i].z, l->z, 1, cosf(glm_rad(s->outer_cone_deg)));
         scale3(b->lights[i].radiance, l->radiance, 1, 0);
+        scale3(b->lights[i].open, face->emission_mean, 1, 0);
     }
 }
 
@@ -230,8 +231,10 @@ static bool shade(struct frame *f, struct pen_error *error)
         round |= type == PEN_LIGHT_DISK || type == PEN_LIGHT_SPHERE;
         punctual |= type >= PEN_LIGHT_SUN;
     }
-    char defines[224];
-    snprintf(defines, sizeof defines, "#define LIGHTS %u\n%s%s%s%s%s%s%s", f->light_count,
+    char defines[288];
+    snprintf(defines, sizeof defines, "#define LIGHTS %u\n%s%s%s%s%s%s%s%s%s", f->light_count,
+        pen_request_is_transparent(job->request) ? "#define TRANSPARENT\n" : "",
+        job->request->ground.on == PEN_FLAG_WORD ? "#define CATCHER\n" : "",
         job->request->sky.on ? "#define SKY\n" : "",
         job->scene->has_gloss ? "#define GLOSSY\n" : "", direct ? "#define RESOLVE\n" : "",
         emission ? "#define EMIT\n" : "", rect ? "#define HAS_RECT\n" : "",

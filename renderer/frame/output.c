@@ -103,8 +103,10 @@ static bool convert(const struct frame_job *job, const struct output_block *bloc
         error);
 }
 
-static uint32_t channels_of(uint32_t layer, enum pen_pixel pixel)
+static uint32_t channels_of(const struct pen_request *r, uint32_t layer, enum pen_pixel pixel)
 {
+    if (layer == PEN_LAYER_BEAUTY && pen_request_is_transparent(r))
+        return 4;
     switch (pen_layers[layer].channels) {
     case PEN_CHANNELS_Y:
     case PEN_CHANNELS_Z:
@@ -122,7 +124,7 @@ static void read_plane(
     struct pen_plane *plane = &frame->planes[frame->plane_count++];
     snprintf(plane->name, sizeof plane->name, "%s", pen_layers[layer].name);
     plane->pixel = pixel;
-    plane->channels = channels_of(layer, pixel);
+    plane->channels = channels_of(job->request, layer, pixel);
     plane->data = pen_alloc((size_t)frame->width * frame->height * pixel_bytes[pixel], 1);
     gl_timer_begin(&job->ctx->timer, PEN_STAGE_READBACK, "readback");
     gl.BindFramebuffer(GL_FRAMEBUFFER, job->targets->color.framebuffer);

@@ -33,6 +33,7 @@ void calibration_setup(
     memset(key.technique_params, 0, sizeof key.technique_params);
     memset(key.ambient, 0, sizeof key.ambient);
     memset(key.background, 0, sizeof key.background);
+    key.ground.on = key.ground.on != 0; /* a shadow catcher is a ground */
     key.exposure_ev = 0;
     key.tone_map = 0;
     key.width = (16 * request->width + request->height / 2) / request->height; /* its shape */

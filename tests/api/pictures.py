@@ -6,7 +6,7 @@ import harness
 
 
 def read_png(data):
-    """Width, height and RGB rows of an 8-bit PNG without interlace."""
+    """Width, height and rows of the pixels of a PNG without interlace, of 8 or 16 bits."""
     assert data[:8] == b"\x89PNG\r\n\x1a\n"
     at, packed = 8, b""
     while at < len(data):
@@ -14,11 +14,11 @@ def read_png(data):
         kind, body = data[at + 4:at + 8], data[at + 8:at + 8 + size]
         if kind == b"IHDR":
             width, height, depth, colour = struct.unpack(">IIBB", body[:10])
-            assert depth == 8 and colour in (0, 2, 6)
+            assert depth in (8, 16) and colour in (0, 2, 6)
         elif kind == b"IDAT":
             packed += body
         at += size + 12
-    n = {0: 1, 2: 3, 6: 4}[colour]
+    n = {0: 1, 2: 3, 6: 4}[colour] * depth // 8
     raw, rows, before = zlib.decompress(packed), [], bytearray(width * n)
     for y in range(height):
         mode, line = raw[y * (width * n + 1)], bytearray(
@@ -30,7 +30,8 @@ def read_png(data):
             paeth = min((abs(p - left), 0, left), (abs(p - up), 1, up),
                         (abs(p - corner), 2, corner))[2]
             line[i] = (line[i] + (0, left, up, (left + up) // 2, paeth)[mode]) & 255
-        rows.append([tuple(line[i:i + n]) for i in range(0, width * n, n)])
+        samples = struct.unpack(">%d%s" % (width * n * 8 // depth, "B" if depth == 8 else "H"), line)
+        rows.append(list(zip(*[iter(samples)] * (n * 8 // depth))))
         before = line
     return width, height, rows
 

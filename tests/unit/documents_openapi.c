@@ -68,7 +68,13 @@ static void check_row(const struct pen_param *row, const char *where)
     described = 0;
     count_help(root, row->help);
     CHECK(described == 1);
-    const cJSON *value = member(schema, "default"), *one = schema;
+    const cJSON *value = member(schema, "default"), *one = schema, *described_by = schema;
+    if (row->word) { /* instead of the other */
+        const cJSON *kinds = member(schema, "anyOf");
+        CHECK_STR(cJSON_GetArrayItem(member(cJSON_GetArrayItem(kinds, 1), "enum"), 0)->valuestring,
+            row->word);
+        one = schema = cJSON_GetArrayItem(kinds, 0);
+    }
     CHECK((value != NULL) != row->automatic); /* what is chosen to suit has no default */
     if (row->count > 1) {
         one = member(schema, "items");
@@ -91,7 +97,7 @@ static void check_row(const struct pen_param *row, const char *where)
         member(one, row->exclusive_min ? "exclusiveMinimum" : "minimum")->valuedouble, row->min, 0);
     CHECK_NEAR(member(one, "maximum")->valuedouble, row->max, 0);
     if (row->unit)
-        CHECK_STR(member(schema, "x-unit")->valuestring, row->unit);
+        CHECK_STR(member(described_by, "x-unit")->valuestring, row->unit);
 }
 
 static void check_table(struct pen_param_table table, const char *where)

@@ -103,7 +103,7 @@ int main(void)
     refused("width=%201", PEN_INVALID, "/width", "1 number");
     refused("width=0", PEN_INVALID, "/width", "must lie in");
     refused("width=8193", PEN_INVALID, "/width", "must lie in");
-    refused("ground=maybe", PEN_INVALID, "/ground", "true or false");
+    refused("ground=maybe", PEN_INVALID, "/ground", "true, false or shadow");
     refused("tone_map=filmic", PEN_INVALID, "/tone_map", "none, reinhard, aces");
     refused("ambient=1,2", PEN_INVALID, "/ambient", "3 numbers");
     refused("ambient=1,2,3,4", PEN_INVALID, "/ambient", "3 numbers");

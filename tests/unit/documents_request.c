@@ -186,7 +186,7 @@ static void test_types(void)
         }
         if (i != 2) {
             snprintf(text, sizeof text, "{\"ground\":%s}", not_objects[i]);
-            refused(text, PEN_INVALID, "/ground", "true or false");
+            refused(text, PEN_INVALID, "/ground", "true, false or shadow");
         }
         snprintf(text, sizeof text, "{\"ambient\":%s}", not_objects[i]);
         refused(text, PEN_INVALID, "/ambient", "array of 3 numbers");

@@ -31,8 +31,11 @@ vec4 grey(float v)
 
 vec4 layer_beauty()
 {
-    vec3 sum = texelFetch(accumulated, pixel, 0).rgb;
-    return vec4(RAW ? sum * view.display.x : display_encode(sum), 1.0);
+    // Multiplied by alpha, as EXR has it; files of integers hold the colour as it is.
+    vec4 sum = texelFetch(accumulated, pixel, 0);
+    if (RAW)
+        return vec4(sum.rgb * view.display.x, sum.a);
+    return sum.a > 0.0 ? vec4(display_encode(sum.rgb / sum.a), sum.a) : vec4(0.0);
 }
 
 vec4 layer_visibility()

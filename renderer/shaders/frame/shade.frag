@@ -1,6 +1,8 @@
 // Direct light of all lights times their visibility, plus ambient and emission. RESOLVE: there is
-// one frame only, so the display curve is applied here. LIGHTS is a constant: unrolled, each
-// light's uniforms are read once for all pixels instead of gathered per pixel.
+// one frame only, so the display curve is applied here. TRANSPARENT: alpha is how much of the pixel
+// the scene covers; what is summed over frames is multiplied by it. CATCHER: of the ground only the
+// shadow is there, as black that covers the more the less light arrives. LIGHTS is a constant:
+// unrolled, each light's uniforms are read once for all pixels instead of gathered per pixel.
 #include "view.glsl"
 #include "octahedral.glsl"
 #include "irradiance.glsl"
@@ -189,32 +191,60 @@ void main()
     m.diffuse = albedo.rgb * (1.0 - surface.g) * (1.0 - 0.08 * surface.a);
     m.f0 = mix(vec3(0.08 * surface.a), albedo.rgb, surface.g);
     m.alpha = max(surface.r * surface.r, 0.002);
+#ifdef CATCHER
+    bool catches = hit && albedo.a == 0.0;
+    if (catches)
+        m.diffuse = vec3(1.0);
+    vec3 unshadowed = view.ambient.rgb * (m.diffuse + m.f0) * surface.b;
+#endif
     vec3 sum = view.ambient.rgb * (m.diffuse + m.f0) * surface.b;
 #ifdef SKY
     if (hit)
         sum += surface.b * sky_reflected(m, n, v, open_to_sky(pixel, depth));
+#ifdef CATCHER
+    if (catches)
+        unshadowed += surface.b * sky_reflected(m, n, v, 1.0);
+#endif
 #endif
 #ifdef EMIT
     sum += texelFetch(g_emission, pixel, 0).rgb;
 #endif
     for (int i = 0; i < LIGHTS; i++) {
         vec3 t = texelFetch(visibility_maps, ivec3(pixel, i), 0).rgb;
+#ifdef CATCHER
+        if (catches) {
+            vec3 light = shade.lights[i].radiance.rgb * reflected(m, shade.lights[i], p, n, v);
+            sum += t * light;
+            unshadowed += shade.lights[i].open.rgb * light;
+            continue;
+        }
+#endif
         if (hit && t != vec3(0.0))
             sum += t * shade.lights[i].radiance.rgb * reflected(m, shade.lights[i], p, n, v);
     }
+    float alpha = hit ? 1.0 : 0.0;
     vec3 background = view.background.rgb;
 #ifdef SKY
     background += sky_backdrop(-v.y);
 #endif
-    if (albedo.a == 0.0) { // the ground fades into the background, so that it has no edge
+    if (hit && albedo.a == 0.0) { // the ground fades into the background, so that it has no edge
         float d = distance(p.xz, view.ground.xz) / view.ground.w;
-        sum = mix(sum, background, smoothstep(0.15, 0.6, d));
+        alpha = 1.0 - smoothstep(0.15, 0.6, d);
+#ifdef CATCHER
+        const vec3 brightness = vec3(0.2126, 0.7152, 0.0722);
+        float open = dot(unshadowed, brightness);
+        alpha *= open > 0.0 ? clamp(1.0 - dot(sum, brightness) / open, 0.0, 1.0) : 0.0;
+        sum = vec3(0.0);
+#endif
     }
-    if (!hit)
-        sum = background;
-#ifdef RESOLVE
-    color = vec4(display_encode(sum), 1.0);
+#ifdef TRANSPARENT
+    vec4 covered = alpha > 0.0 ? vec4(sum, alpha) : vec4(0.0);
 #else
-    color = vec4(sum * view.display.w, view.display.w);
+    vec4 covered = vec4(alpha > 0.0 ? mix(sum, background, 1.0 - alpha) : background, 1.0);
+#endif
+#ifdef RESOLVE
+    color = vec4(display_encode(covered.rgb), covered.a);
+#else
+    color = vec4(covered.rgb * covered.a, covered.a) * view.display.w;
 #endif
 }

@@ -127,9 +127,9 @@ def read_tiff(data):
 
 
 def read_png(data):
-    """(width, height, colour type, bits, samples, texts); filters 0 and 1 only."""
+    """(width, height, channels, bits, samples, (texts, colour chunks)); filters 0 and 1 only."""
     assert data[:8] == b"\x89PNG\r\n\x1a\n"
-    at, body, texts, kinds = 8, b"", {}, []
+    at, body, texts, colours, kinds = 8, b"", {}, {}, []
     while at < len(data):
         size, = struct.unpack_from(">I", data, at)
         kind, content = data[at + 4:at + 8], data[at + 8:at + 8 + size]
@@ -143,6 +143,9 @@ def read_png(data):
         elif kind == b"tEXt":
             key, text = content.split(b"\0", 1)
             texts[key.decode("latin-1")] = text.decode("latin-1")
+        elif kind in (b"sRGB", b"gAMA", b"cHRM", b"cICP", b"iCCP"):
+            assert b"IDAT" not in kinds
+            colours[kind] = content
         at += 12 + size
     assert kinds[0] == b"IHDR" and kinds[-1] == b"IEND" and at == len(data)
     raw = zlib.decompress(body)  # checks the Adler-32 too
@@ -156,7 +159,7 @@ def read_png(data):
             for i in range(bpp, len(row)):
                 row[i] = (row[i] + row[i - bpp]) & 255
         samples.extend(struct.unpack(">%d%s" % (width * channels, "B" if bits == 8 else "H"), row))
-    return width, height, channels, bits, samples, texts
+    return width, height, channels, bits, samples, (texts, colours)
 
 
 def encode(tool, *args):
@@ -179,7 +182,11 @@ def check_integers(tool, kind, reader, bits, pixel, channels, width, height):
             got = samples[i * channels + k]
             assert got == want, (kind, bits, width, height, i, k, got, want)
     if kind == "png":
-        assert extra == {"technique": "pcss", "title": 'a scene, with = and "quotes"'}, extra
+        texts, colours = extra
+        assert texts == {"technique": "pcss", "title": 'a scene, with = and "quotes"'}, texts
+        # PNG (third edition), table of what sRGB's chunk is accompanied by.
+        assert colours == {b"sRGB": b"\0", b"gAMA": struct.pack(">I", 45455), b"cHRM": struct.pack(
+            ">8I", 31270, 32900, 64000, 33000, 30000, 60000, 15000, 6000)}, colours
     else:
         assert b"technique=pcss" in extra[270] and 306 not in extra, extra  # 306: the time
     print(kind, bits, "bit", channels, "channels", width, "x", height, len(data), "bytes: same")
@@ -192,6 +199,12 @@ def check_exr(tool, bits, pixel, channels, width, height, names):
     assert attributes["technique"] == ("string", b"pcss"), attributes
     assert attributes["title"][1] == b'a scene, with = and "quotes"'
     assert "capDate" not in attributes and "DateTime" not in attributes, attributes.keys()
+    if "beauty" in names:  # BT.709, and white D65
+        kind, raw = attributes["chromaticities"]
+        xy = [0.64, 0.33, 0.3, 0.6, 0.15, 0.06, 0.3127, 0.329]
+        assert kind == "chromaticities" and list(struct.unpack("<8f", raw)) == list(map(as_float32, xy))
+    else:
+        assert "chromaticities" not in attributes
     expected = {}
     for p, name in enumerate(names):
         count = channels if p == 0 else 1 if name == "depth" else 3
@@ -224,6 +237,7 @@ def main():
         for channels in (1, 3, 4) if bits != pixel else (3,):
             for reader, kind in ((read_tiff, "tiff"), (read_png, "png")):
                 check_integers(tool, kind, reader, bits, pixel, channels, 61, 37)
+    assert not read_png(encode(tool, "png", 8, 8, 3, 9, 9, "normal"))[5][1]  # data has no colour
     for width, height in ((1, 1), (1, 8192), (8191, 3)):
         check_integers(tool, "tiff", read_tiff, 16, 32, 3, width, height)
         check_exr(tool, 16, 16, 3, width, height, ["beauty"])

@@ -59,6 +59,12 @@ static void on_picture(void *context, struct picture *picture)
     result_cache_put(s->cache, picture);
 }
 
+static void on_measured(void *context, const struct pen_result *result)
+{
+    struct service *s = context;
+    metrics_render(s->metrics, result);
+}
+
 static void on_work(void *context)
 {
     struct service *s = context;
@@ -204,6 +210,7 @@ static bool start_pool(struct service *s, struct pen_error *error)
         .scheduler = s->scheduler,
         .open_job = open_job,
         .on_picture = on_picture,
+        .on_measured = on_measured,
         .context = s,
         .renderer = {.device = {.choice = c->device.index,
                          .index = (uint32_t)c->device_index,

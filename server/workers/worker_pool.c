@@ -279,6 +279,7 @@ static void on_done(
     outcome.result = &result;
     if (outcome.error.code == PEN_OK && flight->render->measure != MEASURE_PICTURE) {
         measured_take(flight->render->measure, fds, &outcome);
+        pool->config.on_measured(pool->config.context, &result);
     } else if (outcome.error.code == PEN_OK) {
         char tag[PEN_ID_HEX + 1];
         picture_tag(&flight->render->request, &result.device, tag);

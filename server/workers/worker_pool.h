@@ -18,6 +18,8 @@ struct worker_pool_config {
         void *context, struct channel_job *job, struct channel_fds *fds, struct pen_error *error);
     /* A picture was made (before those who wait are answered). */
     void (*on_picture)(void *context, struct picture *picture);
+    /* One that was rendered to be measured; the result has its times. */
+    void (*on_measured)(void *context, const struct pen_result *result);
     void *context;
 };
 

@@ -240,6 +240,8 @@ bool imp_primitive(
             error, PEN_TOO_BIG, "", "The scene has more than %u vertices.", IMP_MAX_ACCESSOR);
     struct imp_geometry g = {0};
     bool done = read_triangles(context, &g, primitive, positions.count, error);
+    if (done && !g.index_count)
+        imp_warn(context, "A primitive without any triangle is not drawn.");
     if (done && g.index_count)
         done = read_vertices(context, &g, primitive, positions.count, error) &&
                add(context, number, &g, &context->primitives[number], error);

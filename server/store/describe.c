@@ -47,8 +47,8 @@ static char *describe_scene(
     };
     memcpy(info.id, id, PEN_ID_BYTES);
     for (int k = 0; k < 3; k++) {
-        info.bounds_min[k] = scene->header->origin[k] + pen_widen(scene->header->bounds_min[k]);
-        info.bounds_max[k] = scene->header->origin[k] + pen_widen(scene->header->bounds_max[k]);
+        info.bounds_min[k] = scene->header->origin[k] + pen_widen(scene->header->extent_min[k]);
+        info.bounds_max[k] = scene->header->origin[k] + pen_widen(scene->header->extent_max[k]);
     }
     struct pen_scene_camera *cameras = pen_alloc_zero(scene->camera_count + 1, sizeof *cameras);
     struct pen_scene_light *lights = pen_alloc_zero(scene->light_count + 1, sizeof *lights);

@@ -99,8 +99,8 @@ class Blob:
     def __init__(self, data):
         assert data[:8] == b"PSCENE\r\n"
         self.bounds = struct.unpack("<6f", data[80:104])
-        self.triangles, = struct.unpack("<Q", data[104:112])
-        sections = struct.unpack("<26Q", data[120:120 + 208])
+        self.triangles, = struct.unpack("<Q", data[128:136])
+        sections = struct.unpack("<26Q", data[144:144 + 208])
         cut = [data[sections[2 * i]:sections[2 * i] + sections[2 * i + 1]] for i in range(13)]
         self.positions = array("f")
         self.positions.frombytes(cut[0])

@@ -42,12 +42,110 @@ static void modes(void)
     CHECK(r.ok && draws(&r.scene, V(0, 0, 0), V(1, 0, 0), V(1, 1, 0)));
     CHECK(r.ok && draws(&r.scene, V(0, 0, 0), V(1, 1, 0), V(2, 0, 0)));
     imported_free(&r);
+}
 
+/* Twice the area of the triangle that starts at `index`, as a vector along its front. */
+static void front(const struct psc_scene *scene, uint32_t index, float normal[3])
+{
+    const float *p[3];
+    for (int i = 0; i < 3; i++)
+        p[i] = scene->positions[scene->indices[index + i]];
+    for (int k = 0; k < 3; k++) {
+        int a = (k + 1) % 3, b = (k + 2) % 3;
+        normal[k] =
+            (p[1][a] - p[0][a]) * (p[2][b] - p[0][b]) - (p[1][b] - p[0][b]) * (p[2][a] - p[0][a]);
+    }
+}
+
+/* Points and lines are solids: 8 triangles for each point used and for each line, all facing
+ * outwards; what is told of the scene's size has no thickness. */
+static void marks(void)
+{
+    const uint32_t lines[4] = {0, 2, 5, 4}; /* of five points, in modes 0 to 3 */
     for (int mode = 0; mode < 4; mode++) {
-        r = zigzag(mode);
-        CHECK(r.ok && r.scene.header->triangles == 0 && has_warning(&r.scene, "Points and lines"));
+        struct imported r = zigzag(mode);
+        uint32_t points = mode == 1 ? 4 : 5; /* the last of five begins no pair */
+        CHECK(r.ok && has_warning(&r.scene, "thin solids"));
+        CHECK(r.ok && r.scene.header->triangles == 8 * (points + lines[mode]));
+        if (!r.ok)
+            continue;
+        for (uint32_t i = 0; i < r.scene.index_count; i += 3) {
+            float n[3], dot = 0;
+            front(&r.scene, i, n);
+            for (int k = 0; k < 3; k++)
+                for (int corner = 0; corner < 3; corner++)
+                    dot += n[k] * r.scene.attributes[r.scene.indices[i + corner]].normal[k];
+            CHECK(dot > 0);
+        }
+        const struct psc_header *h = r.scene.header;
+        const float most[3] = {mode == 1 ? 1 : 2, 1, 0};
+        float thickness = h->bounds_max[2];
+        CHECK(thickness > 0.002f && thickness < 0.03f);
+        for (int k = 0; k < 3; k++) {
+            CHECK_NEAR(h->extent_min[k], 0, 0);
+            CHECK_NEAR(h->extent_max[k], most[k], 0);
+            CHECK(h->bounds_min[k] <= -0.9f * thickness &&
+                  h->bounds_max[k] >= most[k] + 0.9f * thickness);
+        }
         imported_free(&r);
     }
+}
+
+/* The octahedra of points are closed: by the divergence theorem each encloses 4/3 r^3. Colours go
+ * with them, and a node that turns and scales moves the extent as it moves the points. */
+static void point_solids(void)
+{
+    const float p[3][3] = {{0, 0, 0}, {3, 0, 0}, {0, 4, 0}}; /* the diagonal is 5 */
+    const uint8_t colors[12] = {255, 0, 0, 255, 0, 255, 0, 255, 0, 0, 255, 255};
+    uint8_t data[48];
+    memcpy(data, p, 36);
+    memcpy(data + 36, colors, 12);
+    char *json = text(
+        "{\"asset\":{\"version\":\"2.0\"},\"scene\":0,\"scenes\":[{\"nodes\":[0]}],"
+        "\"nodes\":[{\"mesh\":0,\"rotation\":[0,0,0.3826834324,0.9238795325],\"scale\":[2,2,2]}],"
+        "\"meshes\":[{\"primitives\":[{\"mode\":0,\"attributes\":{\"POSITION\":0,\"COLOR_0\":1}}]}]"
+        ","
+        "\"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":3,\"type\":\"VEC3\"},"
+        "{\"bufferView\":1,\"componentType\":5121,\"normalized\":true,\"count\":3,"
+        "\"type\":\"VEC4\"}],\"bufferViews\":[{\"buffer\":0,\"byteLength\":36},"
+        "{\"buffer\":0,\"byteOffset\":36,\"byteLength\":12}],"
+        "\"buffers\":[{\"byteLength\":48,\"uri\":\"data:;base64,%s\"}]}",
+        base64(data, sizeof data));
+    struct imported r = import_json(json);
+    free(json);
+    CHECK(r.ok && r.scene.vertex_count == 18);
+    if (!r.ok)
+        return;
+    double volume = 0, radius = 0.01 * 5; /* three points far apart: the largest */
+    for (uint32_t i = 0; i < r.scene.index_count; i += 3) {
+        float n[3];
+        front(&r.scene, i, n);
+        for (int k = 0; k < 3; k++)
+            volume += n[k] * r.scene.positions[r.scene.indices[i]][k] / 6;
+    }
+    CHECK_NEAR(volume, 3 * 4 / 3.0 * radius * radius * radius, 1e-5);
+    for (int i = 0; i < 3; i++) {
+        uint32_t v = vertex_at(&r.scene, p[i][0], p[i][1], (float)radius);
+        CHECK(v != UINT32_MAX && !memcmp(r.scene.attributes[v].color, colors + 4 * i, 4));
+    }
+    /* An eighth of a turn, twice as large: (3,0) to (6,6)/sqrt 2, (0,4) to (-8,8)/sqrt 2. */
+    const struct psc_header *h = r.scene.header;
+    CHECK_NEAR(h->extent_min[0], -8 / sqrt(2), 1e-5);
+    CHECK_NEAR(h->extent_max[0], 6 / sqrt(2), 1e-5);
+    CHECK_NEAR(h->extent_max[1], 8 / sqrt(2), 1e-5);
+    CHECK_NEAR(h->extent_max[2], 0, 1e-7);
+    CHECK_NEAR(h->bounds_max[2], 2 * radius, 1e-6);
+    imported_free(&r);
+}
+
+/* A cloud that would need more triangles than a scene may have is refused before it is built. */
+static void too_many_points(void)
+{
+    struct imported r = import_json(
+        HEAD "\"meshes\":[{\"primitives\":[{\"mode\":0,\"attributes\":{\"POSITION\":0}}]}],"
+             "\"accessors\":[{\"componentType\":5126,\"count\":3000000,\"type\":\"VEC3\"}]}");
+    CHECK(r.error.code == PEN_TOO_BIG && strstr(r.error.message, "points or lines"));
+    imported_free(&r);
 }
 
 /* One vertex of a triangle with every attribute; colours as vec3 of bytes, uv
@@ -214,6 +312,9 @@ static void huge(void)
 int main(void)
 {
     modes();
+    marks();
+    point_solids();
+    too_many_points();
     attributes();
     sharing_and_welding();
     meshlets();

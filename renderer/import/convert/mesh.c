@@ -2,14 +2,14 @@
 #include "protocol/memory.h"
 #include "renderer/import/geometry/accessor.h"
 #include "renderer/import/base/budget.h"
+#include "renderer/import/convert/marks.h"
 #include "renderer/import/convert/material.h"
-#include "renderer/import/geometry/geometry.h"
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { TRIANGLES = 4, TRIANGLE_STRIP = 5, TRIANGLE_FAN = 6 };
+enum { LINES = 1, TRIANGLES = 4, TRIANGLE_STRIP = 5, TRIANGLE_FAN = 6 };
 
 #define FARTHEST 1e12f /* m, as in the blob */
 
@@ -25,10 +25,17 @@ static uint32_t corner(const struct corners *corners, uint32_t i)
     return corners->indexed ? imp_read_index(&corners->indices, i) : i;
 }
 
-/* Unrolls strips and fans: section 3.7.2.1 of the glTF 2.0 specification. */
+/* Points and lines keep their corners as they are; unrolls strips and fans: section 3.7.2.1 of the glTF 2.0 specification. */
 static void unroll(struct imp_geometry *g, const struct corners *corners, uint32_t mode)
 {
     uint32_t n = corners->count, out = 0;
+    if (mode < TRIANGLES) {
+        g->indices = pen_alloc_zero(n, sizeof *g->indices);
+        n -= mode == LINES ? n % 2 : 0; /* a pair is a line */
+        for (g->index_count = 0; g->index_count < n; g->index_count++)
+            g->indices[g->index_count] = corner(corners, g->index_count);
+        return;
+    }
     uint32_t triangles = mode == TRIANGLES ? n / 3 : n >= 3 ? n - 2 : 0;
     g->indices = pen_alloc_zero(3 * (size_t)triangles, sizeof *g->indices);
     for (uint32_t i = 0; i < triangles; i++) {
@@ -79,11 +86,12 @@ static bool read_triangles(struct imp_context *context, struct imp_geometry *g,
     } else if (vertex_count > IMP_MAX_VERTICES - context->vertex_count) {
         return too_many_vertices(error);
     }
-    uint64_t most = primitive->mode == TRIANGLES ? corners.count : 3 * (uint64_t)corners.count;
+    uint64_t most = primitive->mode <= TRIANGLES ? corners.count : 3 * (uint64_t)corners.count;
     if (most > IMP_MAX_INDICES - context->index_count)
         return too_many_triangles(error);
     unroll(g, &corners, primitive->mode);
-    context->index_count += g->index_count;
+    if (primitive->mode >= TRIANGLES)
+        context->index_count += g->index_count;
     for (uint32_t i = 0; i < g->index_count; i++)
         if (g->indices[i] >= vertex_count)
             return pen_fail(error, PEN_INVALID, pointer,
@@ -185,8 +193,9 @@ fail:
     return done;
 }
 
-static bool add(struct imp_context *context, uint32_t number, struct imp_geometry *g, uint32_t *psc,
-    struct pen_error *error)
+/* `points`: what the described bounds are of; NULL: the geometry's own positions. */
+static bool add(struct imp_context *context, uint32_t number, struct imp_geometry *g,
+    const float (*points)[3], uint32_t point_count, uint32_t *psc, struct pen_error *error)
 {
     const struct gltf_primitive *primitive = &context->model->primitives[number];
     struct primitive_bounds *bounds = &context->primitive_bounds[number];
@@ -210,7 +219,9 @@ static bool add(struct imp_context *context, uint32_t number, struct imp_geometr
         .material = imp_material(context, primitive->material),
         .need_tangents = imp_material_has_normal_map(context, primitive->material),
         .meshlet_triangles = g->meshlet_triangles,
-        .meshlet_count = g->meshlet_count};
+        .meshlet_count = g->meshlet_count,
+        .points = points,
+        .point_count = point_count};
     return psc_builder_add_mesh(context->builder, &mesh, psc, error);
 }
 
@@ -222,10 +233,6 @@ bool imp_primitive(
     if (*psc != IMP_NOT_YET)
         return true;
     *psc = context->primitives[number] = IMP_SKIPPED;
-    if (primitive->mode < TRIANGLES) {
-        imp_warn(context, "Points and lines are not drawn.");
-        return true;
-    }
     if (primitive->position < 0) {
         imp_warn(context, "A primitive without positions is not drawn.");
         return true;
@@ -240,11 +247,18 @@ bool imp_primitive(
             error, PEN_TOO_BIG, "", "The scene has more than %u vertices.", IMP_MAX_ACCESSOR);
     struct imp_geometry g = {0};
     bool done = read_triangles(context, &g, primitive, positions.count, error);
-    if (done && !g.index_count)
+    bool drawn = done && g.index_count;
+    if (done && !drawn)
         imp_warn(context, "A primitive without any triangle is not drawn.");
-    if (done && g.index_count)
-        done = read_vertices(context, &g, primitive, positions.count, error) &&
-               add(context, number, &g, &context->primitives[number], error);
+    float(*points)[3] = NULL;
+    done = done && (!drawn || read_vertices(context, &g, primitive, positions.count, error));
+    uint32_t point_count = g.vertex_count;
+    if (done && drawn && primitive->mode < TRIANGLES)
+        done = imp_marks_thicken(context, &g, primitive->mode, &points, error);
+    if (done && drawn)
+        done = add(context, number, &g, (const float(*)[3])points, point_count,
+            &context->primitives[number], error);
+    free(points);
     imp_geometry_finish(&g);
     *psc = context->primitives[number];
     return done;

@@ -1,0 +1,176 @@
+/* Points and lines as solids, which are lit and cast like everything else: an octahedron at each
+ * point and at each end of a line, and a square bar along each line, with the normals of spheres
+ * and cylinders. How thick they are follows from the primitive itself. */
+#include "renderer/import/convert/marks.h"
+#include "protocol/memory.h"
+#include "renderer/import/base/budget.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { POINTS, LINES, LINE_LOOP };
+
+#define POINT_OF_SPACING 0.25f /* a point's radius, of the distance if they filled a square ... */
+#define POINT_LEAST 0.001f     /* ... but of the primitive's diagonal at least and at most this */
+#define POINT_MOST 0.01f
+#define LINE_RADIUS 0.004f
+#define LONE_RADIUS 0.01f /* m: where there is no diagonal */
+
+/* A solid in the making: vertices that take all but place and normal from vertex `from`. */
+struct solid {
+    struct imp_geometry g;
+    uint32_t *from;
+};
+
+static uint32_t add_vertex(
+    struct solid *s, uint32_t from, const float center[3], const float normal[3], float radius)
+{
+    uint32_t v = s->g.vertex_count++;
+    s->from[v] = from;
+    for (int k = 0; k < 3; k++) {
+        s->g.positions[v][k] = center[k] + radius * normal[k];
+        s->g.normals[v][k] = normal[k];
+    }
+    return v;
+}
+
+static void add_triangle(struct solid *s, uint32_t a, uint32_t b, uint32_t c)
+{
+    uint32_t *to = s->g.indices + s->g.index_count;
+    to[0] = a, to[1] = b, to[2] = c;
+    s->g.index_count += 3;
+}
+
+static void add_octahedron(struct solid *s, uint32_t from, const float center[3], float radius)
+{
+    uint32_t first = s->g.vertex_count;
+    for (int i = 0; i < 6; i++) {
+        float normal[3] = {0, 0, 0};
+        normal[i / 2] = i % 2 ? -1 : 1;
+        add_vertex(s, from, center, normal, radius);
+    }
+    for (uint32_t octant = 0; octant < 8; octant++) {
+        uint32_t x = first + (octant & 1), y = first + 2 + (octant >> 1 & 1),
+                 z = first + 4 + (octant >> 2);
+        bool odd = __builtin_popcount(octant) % 2;
+        add_triangle(s, x, odd ? z : y, odd ? y : z);
+    }
+}
+
+static void add_bar(
+    struct solid *s, uint32_t a, uint32_t b, const float pa[3], const float pb[3], float radius)
+{
+    float d[3], u[3], v[3], length = 0;
+    int thin = 0; /* the axis that the line is farthest from */
+    for (int k = 0; k < 3; k++) {
+        d[k] = pb[k] - pa[k];
+        length += d[k] * d[k];
+        thin = fabsf(d[k]) < fabsf(d[thin]) ? k : thin;
+    }
+    length = sqrtf(length);
+    if (!(length > 0) || !isfinite(length))
+        return;
+    float along = 0, w[3] = {0, 0, 0}, size = 0;
+    w[thin] = 1;
+    for (int k = 0; k < 3; k++)
+        d[k] /= length;
+    along = d[thin];
+    for (int k = 0; k < 3; k++) {
+        u[k] = w[k] - along * d[k];
+        size += u[k] * u[k];
+    }
+    for (int k = 0; k < 3; k++)
+        u[k] /= sqrtf(size);
+    for (int k = 0; k < 3; k++)
+        v[k] = d[(k + 1) % 3] * u[(k + 2) % 3] - d[(k + 2) % 3] * u[(k + 1) % 3];
+    uint32_t first = s->g.vertex_count;
+    for (int i = 0; i < 4; i++) { /* u, v, -u, -v: counter-clockwise as seen against d */
+        float normal[3];
+        for (int k = 0; k < 3; k++)
+            normal[k] = (i < 2 ? 1.0f : -1.0f) * (i % 2 ? v[k] : u[k]);
+        add_vertex(s, a, pa, normal, radius);
+        add_vertex(s, b, pb, normal, radius);
+    }
+    for (uint32_t i = 0; i < 4; i++) {
+        uint32_t here = first + 2 * i, next = first + 2 * ((i + 1) % 4);
+        add_triangle(s, here, next, here + 1);
+        add_triangle(s, next, next + 1, here + 1);
+    }
+}
+
+static float diagonal(const struct imp_geometry *g)
+{
+    double square = 0;
+    for (int k = 0; k < 3; k++) {
+        float least = g->positions[0][k], most = least;
+        for (uint32_t i = 1; i < g->vertex_count; i++) {
+            least = fminf(least, g->positions[i][k]);
+            most = fmaxf(most, g->positions[i][k]);
+        }
+        square += ((double)most - least) * ((double)most - least);
+    }
+    return (float)sqrt(square);
+}
+
+static float radius_of(const struct imp_geometry *g, uint32_t mode)
+{
+    float size = diagonal(g);
+    if (!(size > 0))
+        return LONE_RADIUS;
+    if (mode != POINTS)
+        return LINE_RADIUS * size;
+    float radius = POINT_OF_SPACING * size / sqrtf((float)g->vertex_count);
+    return fminf(fmaxf(radius, POINT_LEAST * size), POINT_MOST * size);
+}
+
+/* The attributes that were given, for every vertex of the solid. */
+static void take_attributes(struct solid *s, const struct imp_geometry *given)
+{
+    uint32_t n = s->g.vertex_count;
+    for (int k = 0; k < 2; k++) {
+        s->g.uv[k] = given->uv[k] ? pen_alloc_zero(n, sizeof **s->g.uv) : NULL;
+        for (uint32_t v = 0; given->uv[k] && v < n; v++)
+            memcpy(s->g.uv[k][v], given->uv[k][s->from[v]], sizeof **s->g.uv);
+    }
+    s->g.colors = given->colors ? pen_alloc_zero(n, sizeof *s->g.colors) : NULL;
+    for (uint32_t v = 0; given->colors && v < n; v++)
+        memcpy(s->g.colors[v], given->colors[s->from[v]], sizeof *s->g.colors);
+}
+
+bool imp_marks_thicken(struct imp_context *context, struct imp_geometry *g, uint32_t mode,
+    float (**points)[3], struct pen_error *error)
+{
+    uint32_t corners = g->index_count;
+    uint32_t bars = mode == POINTS  ? 0
+                    : mode == LINES ? corners / 2
+                                    : corners - (mode != LINE_LOOP && corners);
+    uint64_t vertices = 6 * (uint64_t)g->vertex_count + 8 * (uint64_t)bars;
+    uint64_t indices = 24 * ((uint64_t)g->vertex_count + bars);
+    if (vertices > IMP_MAX_VERTICES - context->vertex_count ||
+        indices > IMP_MAX_INDICES - context->index_count)
+        return pen_fail(error, PEN_TOO_BIG, "",
+            "The scene has more points or lines than can be drawn: each takes 8 triangles of %llu.",
+            IMP_MAX_INDICES / 3);
+    context->vertex_count += vertices;
+    context->index_count += indices;
+    imp_warn(context, "Points and lines are drawn as thin solids.");
+    struct solid s = {.g = {.positions = pen_alloc_zero((size_t)vertices, sizeof *s.g.positions),
+                          .normals = pen_alloc_zero((size_t)vertices, sizeof *s.g.normals),
+                          .indices = pen_alloc_zero((size_t)indices, sizeof *s.g.indices)},
+        .from = pen_alloc_zero((size_t)vertices, sizeof *s.from)};
+    float radius = radius_of(g, mode);
+    for (uint32_t v = 0; v < g->vertex_count; v++)
+        add_octahedron(&s, v, g->positions[v], radius);
+    for (uint32_t i = 0; i < bars; i++) {
+        uint32_t first = mode == LINES ? 2 * i : i;
+        uint32_t a = g->indices[first], b = g->indices[(first + 1) % corners];
+        add_bar(&s, a, b, g->positions[a], g->positions[b], radius);
+    }
+    take_attributes(&s, g);
+    free(s.from);
+    *points = g->positions;
+    g->positions = NULL;
+    imp_geometry_finish(g);
+    *g = s.g;
+    return true;
+}

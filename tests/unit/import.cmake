@@ -4,7 +4,7 @@ if(TARGET penumbra_import)
     add_library(test_import_support STATIC import_support.c)
     target_link_libraries(test_import_support PUBLIC penumbra_import penumbra_blob
         PkgConfig::import_test meshoptimizer::meshoptimizer)
-    foreach(part document accessor mesh node material files draco)
+    foreach(part document accessor mesh node material files draco meshopt)
         penumbra_unit_test(import_${part} import_${part}.c LIBS test_import_support)
     endforeach()
 

@@ -165,8 +165,7 @@ static bool open_views(
         struct imp_view *view = &document->views[i];
         char pointer[64];
         snprintf(pointer, sizeof pointer, "/bufferViews/%u", i++);
-        if (cJSON_GetObjectItemCaseSensitive(
-                cJSON_GetObjectItemCaseSensitive(item, "extensions"), "EXT_meshopt_compression"))
+        if (imp_meshopt_of(item))
             continue;
         const cJSON *offset = cJSON_GetObjectItemCaseSensitive(item, "byteOffset");
         const cJSON *stride = cJSON_GetObjectItemCaseSensitive(item, "byteStride");

@@ -1,5 +1,5 @@
 /* A glTF document with everything that it points to outside of itself resolved: buffers, buffer
- * views (EXT_meshopt_compression unpacked) and the bytes of images. What is left is plain JSON
+ * views (meshopt compression unpacked) and the bytes of images. What is left is plain JSON
  * without any URI, for tinygltf. */
 #pragma once
 #include "renderer/import/files/files.h"
@@ -43,7 +43,9 @@ void imp_document_finish(struct imp_document *document);
 /* memory.c: some that lives as long as the document. */
 uint8_t *imp_document_alloc(struct imp_document *document, size_t bytes);
 
-/* meshopt_views.c: unpacks the views that carry EXT_meshopt_compression into document->views. */
+/* meshopt_views.c: what a view says of EXT_ or KHR_meshopt_compression; NULL: nothing. */
+const struct cJSON *imp_meshopt_of(const struct cJSON *view);
+/* Unpacks the views that carry it into document->views. */
 bool imp_document_unpack_views(struct imp_document *document, struct pen_error *error);
 
 /* draco.c: makes ordinary primitives of those that carry KHR_draco_mesh_compression. */

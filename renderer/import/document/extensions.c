@@ -33,6 +33,7 @@ static const struct {
     {"KHR_materials_variants", ""},
     {"KHR_materials_volume", "is drawn without depth: nothing is absorbed or bent inside"},
     {"KHR_mesh_quantization", ""},
+    {"KHR_meshopt_compression", ""},
     {"KHR_node_hoverability", ""},
     {"KHR_node_selectability", ""},
     {"KHR_node_visibility", ""},

@@ -1,7 +1,9 @@
-/* EXT_meshopt_compression: https://github.com/KhronosGroup/glTF, extensions/2.0/Vendor. The library
- * asserts what the extension demands of sizes, so all of it is checked here first. */
+/* EXT_meshopt_compression and KHR_meshopt_compression: https://github.com/KhronosGroup/glTF,
+ * extensions/2.0/Vendor and Khronos. The library asserts what the extensions demand of sizes, so all
+ * of it is checked here first. */
 #include "renderer/import/base/budget.h"
 #include "renderer/import/document/document.h"
+#include "renderer/import/document/meshopt.h"
 #include "renderer/import/base/text.h"
 #include <cjson/cJSON.h>
 #include <meshoptimizer.h>
@@ -31,33 +33,44 @@ static bool unpack(struct imp_view *view, const cJSON *extension, struct imp_byt
     bool octahedral = is(extension, "filter", "OCTAHEDRAL");
     bool quaternion = is(extension, "filter", "QUATERNION");
     bool exponential = is(extension, "filter", "EXPONENTIAL");
-    bool fits = attributes ? stride % 4 == 0 && (!octahedral || stride == 4 || stride == 8) &&
-                                 (!quaternion || stride == 8)
-                           : (stride == 2 || stride == 4) && none && (!triangles || count % 3 == 0);
+    bool color = is(extension, "filter", "COLOR");
+    bool fits = attributes
+                    ? stride % 4 == 0 && (!octahedral || stride == 4 || stride == 8) &&
+                          (!quaternion || stride == 8) && (!color || stride == 4 || stride == 8)
+                    : (stride == 2 || stride == 4) && none && (!triangles || count % 3 == 0);
     if ((!attributes && !triangles && !is(extension, "mode", "INDICES")) ||
-        !(none || octahedral || quaternion || exponential) || !fits)
+        !(none || octahedral || quaternion || exponential || color) || !fits)
         return pen_fail(error, PEN_INVALID, pointer,
-            "glTF %s: the mode, filter, count and byteStride of EXT_meshopt_compression do not fit "
+            "glTF %s: the mode, filter, count and byteStride of meshopt_compression do not fit "
             "together.",
             pointer);
     int failed;
     if (attributes)
-        failed = meshopt_decodeVertexBuffer(out, count, stride, packed.data, packed.bytes);
+        failed = !imp_meshopt_attributes(out, count, stride, packed.data, packed.bytes);
     else if (triangles)
         failed = meshopt_decodeIndexBuffer(out, count, stride, packed.data, packed.bytes);
     else
         failed = meshopt_decodeIndexSequence(out, count, stride, packed.data, packed.bytes);
     if (failed)
         return pen_fail(error, PEN_INVALID, pointer,
-            "glTF %s: the data of EXT_meshopt_compression are damaged.", pointer);
+            "glTF %s: the data of meshopt_compression are damaged.", pointer);
     if (octahedral)
         meshopt_decodeFilterOct(out, count, stride);
     else if (quaternion)
         meshopt_decodeFilterQuat(out, count, stride);
     else if (exponential)
         meshopt_decodeFilterExp(out, count, stride);
+    else if (color)
+        imp_meshopt_colors(out, count, stride);
     *view = (struct imp_view){out, (size_t)count * stride, attributes ? stride : 0};
     return true;
+}
+
+const cJSON *imp_meshopt_of(const cJSON *view)
+{
+    const cJSON *extensions = cJSON_GetObjectItemCaseSensitive(view, "extensions");
+    const cJSON *newer = cJSON_GetObjectItemCaseSensitive(extensions, "KHR_meshopt_compression");
+    return newer ? newer : cJSON_GetObjectItemCaseSensitive(extensions, "EXT_meshopt_compression");
 }
 
 bool imp_document_unpack_views(struct imp_document *document, struct pen_error *error)
@@ -68,8 +81,7 @@ bool imp_document_unpack_views(struct imp_document *document, struct pen_error *
     cJSON_ArrayForEach(item, cJSON_GetObjectItemCaseSensitive(document->root, "bufferViews"))
     {
         struct imp_view *view = &document->views[i];
-        const cJSON *extension = cJSON_GetObjectItemCaseSensitive(
-            cJSON_GetObjectItemCaseSensitive(item, "extensions"), "EXT_meshopt_compression");
+        const cJSON *extension = imp_meshopt_of(item);
         char pointer[64];
         snprintf(pointer, sizeof pointer, "/bufferViews/%u", i++);
         if (!extension)

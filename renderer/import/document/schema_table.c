@@ -37,7 +37,9 @@ SCHEMA(meshopt,
     {"count", UINT, .required = true, .min = 1},
     {"mode", STRING, .required = true},
     {"filter", STRING});
-SCHEMA(view_extensions, OBJ("EXT_meshopt_compression", meshopt));
+SCHEMA(view_extensions,
+    OBJ("EXT_meshopt_compression", meshopt),
+    OBJ("KHR_meshopt_compression", meshopt));
 SCHEMA(view,
     {"buffer", INDEX, .required = true, .into = IN_BUFFERS},
     {"byteOffset", UINT},

@@ -307,7 +307,7 @@ static void test_soup(void)
     for (int k = 0; k < 3; k++) {
         struct pen_trace_light light = downward_light(k == 2 ? PEN_TRACE_DISK : PEN_TRACE_RECT, 1);
         light.origin[1] = k ? 1.6f : 3;
-        struct pen_trace_job job = job_of(r, 256);
+        struct pen_trace_job job = job_of(r, 1024);
         job.front_only = front_only;
         trace(scene, &light, &job, r);
         double squares = 0, most = 0;

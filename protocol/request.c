@@ -12,7 +12,7 @@ const char *const pen_format_names[] = {"png", "exr", "jpeg", "webp", "tiff", NU
 const char *const pen_format_mime[] = {
     "image/png", "image/x-exr", "image/jpeg", "image/webp", "image/tiff", NULL};
 const char *const pen_tone_map_names[] = {
-#define PEN_TONE_MAP(name, text) text,
+#define PEN_TONE_MAP(name, text, curve) text,
 #include "protocol/tone_maps.def"
 #undef PEN_TONE_MAP
     NULL};

@@ -52,7 +52,7 @@ struct pen_camera {
 
 enum pen_format { PEN_PNG, PEN_EXR, PEN_JPEG, PEN_WEBP, PEN_TIFF, PEN_FORMATS };
 enum pen_tone_map {
-#define PEN_TONE_MAP(name, text) PEN_TONE_##name,
+#define PEN_TONE_MAP(name, text, curve) PEN_TONE_##name,
 #include "protocol/tone_maps.def"
 #undef PEN_TONE_MAP
     PEN_TONE_MAPS

@@ -6,5 +6,5 @@
 #define UITEM_AT(name, value) {#name, name, 1},
 #define KNOWN(name) {#name, name, 0},
 #define PEN_LIGHT_TYPE(name, text) {"PEN_LIGHT_" #name, PEN_LIGHT_##name, 0},
-#define PEN_TONE_MAP(name, text) {"PEN_TONE_" #name, PEN_TONE_##name, 0},
+#define PEN_TONE_MAP(name, text, curve) {"PEN_TONE_" #name, PEN_TONE_##name, 0},
 #include "renderer/shared/rows_read.h"

@@ -15,4 +15,8 @@
 #define FIELD(type, name) "    " #type " " #name ";\n"
 #define ARRAY(type, name, count) "    " #type " " #name "[" #count "];\n"
 #define STRUCT_ARRAY(tag, Name, name, count) "    " #Name " " #name "[" #count "];\n"
+#define PEN_TONE_FUNCTION "vec3 tone_curve(int which, vec3 c, float luminance)\n{\n"
+#define PEN_TONE_MAP(name, text, curve)                                                            \
+    "    if (which == PEN_TONE_" #name ")\n        return " #curve ";\n"
+#define PEN_TONE_FUNCTION_END "    return c;\n}\n"
 #include "renderer/shared/rows_read.h"

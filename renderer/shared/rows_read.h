@@ -57,7 +57,7 @@
 #define PEN_LIGHT_TYPE(name, text)
 #endif
 #ifndef PEN_TONE_MAP
-#define PEN_TONE_MAP(name, text)
+#define PEN_TONE_MAP(name, text, curve)
 #endif
 
 #include SHARED_ROWS
@@ -82,3 +82,5 @@
 #undef STRUCT_ARRAY
 #undef PEN_LIGHT_TYPE
 #undef PEN_TONE_MAP
+#undef PEN_TONE_FUNCTION
+#undef PEN_TONE_FUNCTION_END

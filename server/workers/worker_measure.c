@@ -32,21 +32,26 @@ static float encode_srgb(float c)
     return pen_srgb_encodef(c > 0 ? fminf(c, 1) : 0); /* NaN: 0 */
 }
 
-/* Display values in [0, 1] of scene-linear RGB that already has its exposure: tone curve and sRGB (IEC
- * 61966-2-1), as renderer/shaders/frame/display.glsl. */
+static float tone_curve(uint32_t which, float c, float luminance)
+{
+#define PEN_TONE_MAP(name, text, curve)                                                            \
+    if (which == PEN_TONE_##name)                                                                  \
+        return curve;
+#include "protocol/tone_maps.def"
+#undef PEN_TONE_MAP
+    return c;
+}
+
+/* Display values in [0, 1] of scene-linear RGB that already has its exposure: tone curve and sRGB
+ * (IEC 61966-2-1), as renderer/shaders/frame/display.glsl. */
 static void to_display(const float radiance[3], uint32_t tone_map, float display[3])
 {
     float c[3];
     for (int i = 0; i < 3; i++)
         c[i] = fmaxf(radiance[i], 0);
     float luminance = 0.2126f * c[0] + 0.7152f * c[1] + 0.0722f * c[2];
-    for (int i = 0; i < 3; i++) {
-        if (tone_map == PEN_TONE_REINHARD)
-            c[i] /= 1 + luminance;
-        else if (tone_map == PEN_TONE_ACES)
-            c[i] = c[i] * (2.51f * c[i] + 0.03f) / (c[i] * (2.43f * c[i] + 0.59f) + 0.14f);
-        display[i] = encode_srgb(c[i]);
-    }
+    for (int i = 0; i < 3; i++)
+        display[i] = encode_srgb(tone_curve(tone_map, c[i], luminance));
 }
 
 static const float *find_plane(const struct pen_frame *frame, const char *name)

@@ -14,10 +14,6 @@ vec3 srgb_encode(vec3 c)
 vec3 display_encode(vec3 radiance)
 {
     vec3 c = max(radiance * view.display.x, 0.0);
-    int curve = int(view.display.y);
-    if (curve == PEN_TONE_REINHARD)
-        c /= 1.0 + dot(c, vec3(0.2126, 0.7152, 0.0722));
-    else if (curve == PEN_TONE_ACES)
-        c = c * (2.51 * c + 0.03) / (c * (2.43 * c + 0.59) + 0.14);
-    return srgb_encode(c);
+    float luminance = dot(c, vec3(0.2126, 0.7152, 0.0722));
+    return srgb_encode(tone_curve(int(view.display.y), c, luminance));
 }

@@ -3,7 +3,6 @@
 #include "renderer/blob/affine.h"
 #include "renderer/blob/check.h"
 #include "renderer/blob/geometry.h"
-#include <float.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -15,19 +14,26 @@ struct array {
     size_t bytes, capacity;
 };
 
-/* The points that a primitive was made for; none: its own positions. */
-struct stands_for {
-    float (*points)[3];
-    uint32_t count;
+/* What is known of a primitive beside what the blob holds. */
+struct made {
+    float (*points)[3]; /* that it was made for; none: its own positions */
+    uint32_t point_count;
+    bool deforms;
+};
+
+/* Where an instance is in the file's world. */
+struct place {
+    double world[12];
+    double min[3], max[3]; /* posed: its bounds, which the matrix does not tell */
+    bool posed;
 };
 
 struct psc_builder {
     struct array sections[PSC_SECTIONS];
-    struct array places;           /* double[12] of every instance, in the file's world */
-    struct stands_for *stands_for; /* by primitive */
-    size_t stands_for_capacity;
+    struct array places; /* struct place of every instance */
+    struct made *made;   /* by primitive */
+    size_t made_capacity;
     uint32_t primitive_count;
-    uint32_t animations;
     uint32_t lost_instances; /* of primitives that do not exist, or with non-finite transforms */
 };
 
@@ -62,8 +68,8 @@ void psc_builder_destroy(struct psc_builder *builder)
         free(builder->sections[i].data);
     free(builder->places.data);
     for (uint32_t i = 0; i < builder->primitive_count; i++)
-        free(builder->stands_for[i].points);
-    free(builder->stands_for);
+        free(builder->made[i].points);
+    free(builder->made);
     free(builder);
 }
 
@@ -116,9 +122,19 @@ void psc_builder_add_warning(struct psc_builder *builder, const char *format, ..
     append(&builder->sections[PSC_WARNINGS], text, strlen(text) + 1);
 }
 
-void psc_builder_set_animations(struct psc_builder *builder, uint32_t count)
+uint32_t psc_builder_add_motion(
+    struct psc_builder *builder, enum psc_section_id section, const void *items, uint32_t count)
 {
-    builder->animations = count;
+    static const uint32_t item_bytes[] = {
+#define X(id, name, type) [PSC_##id - PSC_NODES] = sizeof(type),
+        PSC_MOTION_SECTIONS(X)
+#undef X
+    };
+    struct array *array = &builder->sections[section];
+    uint32_t bytes = item_bytes[section - PSC_NODES];
+    uint32_t first = (uint32_t)(array->bytes / bytes);
+    append(array, items, (size_t)count * bytes);
+    return first;
 }
 
 static int16_t snorm16(float x)
@@ -201,39 +217,36 @@ static void move_near(struct psc_primitive *p, struct geometry *g)
 static void remember(struct psc_builder *builder, uint32_t primitive, const struct psc_mesh *mesh,
     const float offset[3])
 {
-    builder->stands_for = pen_grow(builder->stands_for, &builder->stands_for_capacity,
-        (size_t)primitive + 1, sizeof *builder->stands_for);
-    struct stands_for *meant = &builder->stands_for[primitive];
+    builder->made = pen_grow(
+        builder->made, &builder->made_capacity, (size_t)primitive + 1, sizeof *builder->made);
+    struct made *made = &builder->made[primitive];
     builder->primitive_count = primitive + 1;
-    *meant = (struct stands_for){NULL, mesh->points ? mesh->point_count : 0};
-    if (meant->count) {
-        meant->points = pen_alloc_zero(meant->count, sizeof *meant->points);
-        for (uint32_t i = 0; i < meant->count; i++)
+    *made = (struct made){.point_count = mesh->points ? mesh->point_count : 0};
+    if (made->point_count) {
+        made->points = pen_alloc_zero(made->point_count, sizeof *made->points);
+        for (uint32_t i = 0; i < made->point_count; i++)
             for (int k = 0; k < 3; k++)
-                meant->points[i][k] = mesh->points[i][k] - offset[k];
+                made->points[i][k] = mesh->points[i][k] - offset[k];
     }
 }
 
-bool psc_builder_add_mesh(struct psc_builder *builder, const struct psc_mesh *mesh,
-    uint32_t *primitive, struct pen_error *error)
+/* `near`: vertices far from their origin are kept relative to an offset. */
+static bool add_geometry(struct psc_builder *builder, const struct psc_mesh *mesh,
+    struct geometry *geometry, bool near, uint32_t *primitive, struct pen_error *error)
 {
-    struct geometry g;
-    if (!psc_geometry_create(&g, mesh, error))
-        return false;
+    struct geometry g = *geometry;
     struct array *s = builder->sections;
     size_t first_vertex = s[PSC_POSITIONS].bytes / 12, first_index = s[PSC_INDICES].bytes / 4;
-    if (first_vertex + g.vertex_count > UINT32_MAX ||
-        first_index + g.index_count > PSC_MAX_INDICES) {
-        psc_geometry_finish(&g);
+    if (first_vertex + g.vertex_count > UINT32_MAX || first_index + g.index_count > PSC_MAX_INDICES)
         return pen_fail(error, PEN_INVALID, "", "The scene has more than 2^31 indices.");
-    }
     struct psc_primitive p = {.first_index = (uint32_t)first_index,
         .index_count = g.index_count,
         .first_vertex = (uint32_t)first_vertex,
         .vertex_count = g.vertex_count,
         .first_meshlet = (uint32_t)(s[PSC_MESHLETS].bytes / sizeof(struct psc_meshlet)),
         .material = mesh->material};
-    move_near(&p, &g);
+    if (near)
+        move_near(&p, &g);
     for (uint32_t i = 0; i < g.vertex_count; i++)
         for (int k = 0; k < 3; k++) {
             float x = g.positions[i][k];
@@ -250,34 +263,144 @@ bool psc_builder_add_mesh(struct psc_builder *builder, const struct psc_mesh *me
         indices[i] = p.first_vertex + g.indices[i];
     *primitive = append_item(&s[PSC_PRIMITIVES], &p, sizeof p);
     remember(builder, *primitive, mesh, p.offset);
-    psc_geometry_finish(&g);
     return true;
 }
 
-void psc_builder_place_instance(
-    struct psc_builder *builder, uint32_t primitive, const double world[12])
+bool psc_builder_add_mesh(struct psc_builder *builder, const struct psc_mesh *mesh,
+    uint32_t *primitive, struct pen_error *error)
+{
+    struct geometry g;
+    if (!psc_geometry_create(&g, mesh, error))
+        return false;
+    bool done = add_geometry(builder, mesh, &g, true, primitive, error);
+    psc_geometry_finish(&g);
+    return done;
+}
+
+static void append_bind(struct psc_builder *builder, const struct geometry *g)
+{
+    struct psc_bind *binds =
+        append(&builder->sections[PSC_BIND], NULL, g->vertex_count * sizeof *binds);
+    for (uint32_t i = 0; i < g->vertex_count; i++) {
+        memset(&binds[i], 0, sizeof binds[i]);
+        memcpy(binds[i].position, g->positions[i], sizeof binds[i].position);
+        memcpy(binds[i].normal, g->normals[i], sizeof binds[i].normal);
+        if (g->tangents)
+            memcpy(binds[i].tangent, g->tangents[i], sizeof binds[i].tangent);
+    }
+}
+
+static void append_influences(
+    struct psc_builder *builder, const struct geometry *g, const struct psc_mesh_deform *how)
+{
+    size_t bytes = how->influence_count * sizeof *how->influences;
+    for (uint32_t i = 0; i < g->vertex_count && bytes; i++)
+        append(&builder->sections[PSC_INFLUENCES],
+            how->influences + (size_t)g->sources[i] * how->influence_count, bytes);
+}
+
+/* `slots`: room for one number per vertex of the caller's, all 0. */
+static void append_target(struct psc_builder *builder, const struct geometry *g,
+    const struct psc_delta *deltas, uint32_t count, uint32_t *slots)
+{
+    struct array *out = &builder->sections[PSC_DELTAS];
+    struct psc_target target = {.first_delta = (uint32_t)(out->bytes / sizeof *deltas)};
+    for (uint32_t i = 0; i < count; i++)
+        slots[deltas[i].vertex] = i + 1;
+    for (uint32_t i = 0; i < g->vertex_count; i++) {
+        uint32_t slot = slots[g->sources[i]];
+        if (!slot)
+            continue;
+        struct psc_delta *delta = append(out, &deltas[slot - 1], sizeof *deltas);
+        delta->vertex = i;
+        target.delta_count++;
+    }
+    for (uint32_t i = 0; i < count; i++)
+        slots[deltas[i].vertex] = 0;
+    append(&builder->sections[PSC_MORPH_TARGETS], &target, sizeof target);
+}
+
+bool psc_builder_add_deforming(struct psc_builder *builder, const struct psc_mesh *mesh,
+    const struct psc_mesh_deform *how, struct psc_deform *deform, struct pen_error *error)
+{
+    struct array *s = builder->sections;
+    struct geometry g;
+    if (!psc_geometry_create(&g, mesh, error))
+        return false;
+    *deform = (struct psc_deform){.skin = -1,
+        .instance = -1,
+        .first_bind = (uint32_t)(s[PSC_BIND].bytes / sizeof(struct psc_bind)),
+        .first_influence = (uint32_t)(s[PSC_INFLUENCES].bytes / sizeof(struct psc_influence)),
+        .influences = how->influence_count,
+        .first_target = (uint32_t)(s[PSC_MORPH_TARGETS].bytes / sizeof(struct psc_target)),
+        .target_count = how->target_count,
+        .flags = mesh->normals ? 0 : PSC_DEFORM_FLAT};
+    bool near = !how->influence_count; /* joints move vertices as they are */
+    bool done = add_geometry(builder, mesh, &g, near, &deform->primitive, error);
+    if (done) {
+        struct psc_primitive *added = (struct psc_primitive *)s[PSC_PRIMITIVES].data;
+        builder->made[deform->primitive].deforms = true;
+        added[deform->primitive].flags = 0; /* what holds of its surface now need not later */
+        uint32_t *slots = pen_alloc(mesh->vertex_count, sizeof *slots);
+        memset(slots, 0, mesh->vertex_count * sizeof *slots);
+        append_bind(builder, &g);
+        append_influences(builder, &g, how);
+        for (uint32_t t = 0; t < how->target_count; t++)
+            append_target(builder, &g, how->targets[t], how->delta_counts[t], slots);
+        free(slots);
+    }
+    psc_geometry_finish(&g);
+    return done;
+}
+
+static uint32_t add_instance(
+    struct psc_builder *builder, uint32_t primitive, const struct place *place)
 {
     size_t primitives = builder->sections[PSC_PRIMITIVES].bytes / sizeof(struct psc_primitive);
     struct psc_instance instance = {.primitive = primitive};
     for (int i = 0; i < 12; i++)
-        instance.world[i] = (float)world[i];
+        instance.world[i] = (float)place->world[i];
     if (primitive >= primitives || !all_finite(instance.world, 12)) {
         builder->lost_instances++;
-        return;
+        return 0;
     }
     if (world_determinant(instance.world) < 0)
-        instance.flags = PSC_MIRRORED;
-    append(&builder->sections[PSC_INSTANCES], &instance, sizeof instance);
-    append(&builder->places, world, 12 * sizeof *world);
+        instance.flags |= PSC_MIRRORED;
+    append(&builder->places, place, sizeof *place);
+    return append_item(&builder->sections[PSC_INSTANCES], &instance, sizeof instance);
 }
 
-void psc_builder_add_instance(
+uint32_t psc_builder_place_instance(
+    struct psc_builder *builder, uint32_t primitive, const double world[12])
+{
+    struct place place = {{0}};
+    memcpy(place.world, world, sizeof place.world);
+    return add_instance(builder, primitive, &place);
+}
+
+uint32_t psc_builder_add_instance(
     struct psc_builder *builder, uint32_t primitive, const float world[12])
 {
     double wide[12];
     for (int i = 0; i < 12; i++)
         wide[i] = world[i];
-    psc_builder_place_instance(builder, primitive, wide);
+    return psc_builder_place_instance(builder, primitive, wide);
+}
+
+uint32_t psc_builder_place_skinned(
+    struct psc_builder *builder, uint32_t primitive, const double min[3], const double max[3])
+{
+    struct place place = {.world = {1, [5] = 1, [10] = 1}, .posed = true};
+    memcpy(place.min, min, sizeof place.min);
+    memcpy(place.max, max, sizeof place.max);
+    return add_instance(builder, primitive, &place);
+}
+
+void psc_builder_hide_instance(struct psc_builder *builder, uint32_t instance)
+{
+    struct array *list = &builder->sections[PSC_INSTANCES];
+    if (instance < list->bytes / sizeof(struct psc_instance))
+        ((struct psc_instance *)list->data)[instance].flags |= PSC_HIDDEN;
 }
 
 /* Chooses the blob's origin and makes all matrices relative to it, for vertices without their
@@ -287,17 +410,21 @@ static void settle_instances(struct psc_builder *builder, double origin[3])
     const struct psc_primitive *primitives =
         (const struct psc_primitive *)builder->sections[PSC_PRIMITIVES].data;
     struct psc_instance *instances = (struct psc_instance *)builder->sections[PSC_INSTANCES].data;
-    const double(*places)[12] = (const double(*)[12])builder->places.data;
+    const struct place *places = (const struct place *)builder->places.data;
     size_t count = builder->places.bytes / sizeof *places;
     double min[3] = {INFINITY, INFINITY, INFINITY}, max[3] = {-INFINITY, -INFINITY, -INFINITY};
     for (size_t i = 0; i < count; i++) {
         const struct psc_primitive *p = &primitives[instances[i].primitive];
-        for (int c = 0; p->index_count && c < 8; c++) {
+        for (int k = 0; places[i].posed && k < 3; k++) {
+            min[k] = fmin(min[k], places[i].min[k]);
+            max[k] = fmax(max[k], places[i].max[k]);
+        }
+        for (int c = 0; !places[i].posed && p->index_count && c < 8; c++) {
             double corner[3], at[3];
             for (int k = 0; k < 3; k++)
                 corner[k] = (double)(c >> k & 1 ? p->bounds_max[k] : p->bounds_min[k]) +
                             (double)p->offset[k];
-            psc_affine_point(places[i], corner, at);
+            psc_affine_point(places[i].world, corner, at);
             for (int k = 0; k < 3; k++)
                 min[k] = fmin(min[k], at[k]), max[k] = fmax(max[k], at[k]);
         }
@@ -308,7 +435,9 @@ static void settle_instances(struct psc_builder *builder, double origin[3])
     for (size_t i = 0; i < count; i++) {
         const float *offset = primitives[instances[i].primitive].offset;
         double at[3];
-        psc_affine_point(places[i], (double[3]){offset[0], offset[1], offset[2]}, at);
+        if (places[i].posed)
+            continue;
+        psc_affine_point(places[i].world, (double[3]){offset[0], offset[1], offset[2]}, at);
         for (int k = 0; k < 3; k++)
             instances[i].world[4 * k + 3] = (float)(at[k] - origin[k]);
     }
@@ -331,88 +460,44 @@ struct psc_material psc_material_default(void)
         .emission = none};
 }
 
-struct box {
-    float min[3], max[3];
-};
-
-static void grow(struct box *box, const float m[12], const float q[3])
+static void merge(float min[3], float max[3], const float box[2][3])
 {
     for (int k = 0; k < 3; k++) {
-        const float *row = m + 4 * k;
-        float w =
-            (float)(row[0] * (double)q[0] + row[1] * (double)q[1] + row[2] * (double)q[2] + row[3]);
-        box->min[k] = fminf(box->min[k], w);
-        box->max[k] = fmaxf(box->max[k], w);
+        min[k] = fminf(min[k], box[0][k]);
+        max[k] = fmaxf(max[k], box[1][k]);
     }
 }
 
-/* Around the points while the budget lasts, then around their box. */
-static void grow_by(struct box *box, const float m[12], const float (*points)[3], uint32_t count,
-    const struct box *all, uint64_t *budget)
+static void world_bounds(const struct psc_builder *builder, struct psc_header *header)
 {
-    if (count <= *budget) {
-        *budget -= count;
-        for (uint32_t i = 0; i < count; i++)
-            grow(box, m, points[i]);
-        return;
-    }
-    for (int c = 0; c < 8; c++)
-        grow(box, m,
-            (const float[3]){c & 1 ? all->max[0] : all->min[0], c & 2 ? all->max[1] : all->min[1],
-                c & 4 ? all->max[2] : all->min[2]});
-}
-
-static struct box box_of(const float (*points)[3], uint32_t count)
-{
-    struct box box = {{FLT_MAX, FLT_MAX, FLT_MAX}, {-FLT_MAX, -FLT_MAX, -FLT_MAX}};
-    for (uint32_t i = 0; i < count; i++)
-        for (int k = 0; k < 3; k++) {
-            box.min[k] = fminf(box.min[k], points[i][k]);
-            box.max[k] = fmaxf(box.max[k], points[i][k]);
-        }
-    return box;
-}
-
-static void merge(struct box *box, const struct box *other)
-{
-    for (int k = 0; k < 3; k++) {
-        box->min[k] = fminf(box->min[k], other->min[k]);
-        box->max[k] = fmaxf(box->max[k], other->max[k]);
-    }
-}
-
-static void world_bounds(struct psc_builder *builder, struct psc_header *header)
-{
-    const float(*positions)[3] = (const float(*)[3])builder->sections[PSC_POSITIONS].data;
-    const struct psc_primitive *primitives =
-        (const struct psc_primitive *)builder->sections[PSC_PRIMITIVES].data;
-    const struct array *list = &builder->sections[PSC_INSTANCES];
+    const struct array *s = builder->sections;
+    const struct psc_scene scene = {.positions = (const float(*)[3])s[PSC_POSITIONS].data,
+        .primitives = (const struct psc_primitive *)s[PSC_PRIMITIVES].data,
+        .instances = (const struct psc_instance *)s[PSC_INSTANCES].data};
     uint64_t budget = BOUND_BUDGET;
-    struct box bounds = box_of(NULL, 0), extent = bounds;
-    for (size_t i = 0; i < list->bytes / sizeof(struct psc_instance); i++) {
-        const struct psc_instance *instance = (const struct psc_instance *)list->data + i;
-        const struct psc_primitive *p = &primitives[instance->primitive];
-        const struct stands_for *meant = &builder->stands_for[instance->primitive];
-        struct box own = box_of(NULL, 0), all;
-        if (!p->index_count)
+    psc_bounds_clear(header->bounds_min, header->bounds_max);
+    psc_bounds_clear(header->extent_min, header->extent_max);
+    for (size_t i = 0; i < s[PSC_INSTANCES].bytes / sizeof *scene.instances; i++) {
+        const struct psc_primitive *p = &scene.primitives[scene.instances[i].primitive];
+        if (!p->index_count || scene.instances[i].flags & PSC_HIDDEN)
             continue;
+        bool tight = p->vertex_count <= budget;
+        budget -= tight ? p->vertex_count : 0;
         header->triangles += p->index_count / 3;
-        memcpy(all.min, p->bounds_min, sizeof all.min);
-        memcpy(all.max, p->bounds_max, sizeof all.max);
-        grow_by(&own, instance->world, positions + p->first_vertex, p->vertex_count, &all, &budget);
-        merge(&bounds, &own);
-        if (meant->count) {
-            own = box_of(NULL, 0);
-            all = box_of((const float(*)[3])meant->points, meant->count);
-            grow_by(&own, instance->world, (const float(*)[3])meant->points, meant->count, &all,
-                &budget);
+        const struct made *made = &builder->made[scene.instances[i].primitive];
+        float box[2][3];
+        psc_bounds_clear(box[0], box[1]);
+        psc_bounds_grow(&scene, (uint32_t)i, tight, box[0], box[1]);
+        merge(header->bounds_min, header->bounds_max, (const float(*)[3])box);
+        if (made->deforms)
+            continue; /* as it stands, that is not the rest pose */
+        if (made->point_count && tight) {
+            psc_bounds_clear(box[0], box[1]);
+            psc_bounds_grow_points(scene.instances[i].world, (const float(*)[3])made->points,
+                made->point_count, box[0], box[1]);
         }
-        merge(&extent, &own);
+        merge(header->extent_min, header->extent_max, (const float(*)[3])box);
     }
-    memcpy(header->bounds_min, bounds.min, sizeof bounds.min);
-    memcpy(header->bounds_max, bounds.max, sizeof bounds.max);
-    memcpy(header->extent_min, extent.min, sizeof extent.min);
-    memcpy(header->extent_max, extent.max, sizeof extent.max);
 }
 
 bool psc_builder_finish(struct psc_builder *builder, const uint8_t source[PEN_ID_BYTES],
@@ -427,10 +512,8 @@ bool psc_builder_finish(struct psc_builder *builder, const uint8_t source[PEN_ID
     if (builder->lost_instances)
         return pen_fail(error, PEN_INVALID, "", "%u instances have a transform that is not finite.",
             builder->lost_instances);
-    struct psc_header header = {.magic = PSC_MAGIC,
-        .version = PSC_VERSION,
-        .header_bytes = sizeof header,
-        .animations = builder->animations};
+    struct psc_header header = {
+        .magic = PSC_MAGIC, .version = PSC_VERSION, .header_bytes = sizeof header};
     memcpy(header.source, source, sizeof header.source);
     settle_instances(builder, header.origin);
     world_bounds(builder, &header);

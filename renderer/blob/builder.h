@@ -9,6 +9,15 @@ struct psc_builder *psc_builder_create(
     void); /* aborts on out of memory, like all allocation here */
 void psc_builder_destroy(struct psc_builder *builder);
 
+/* How a mesh's vertices move, in the caller's vertex numbers. */
+struct psc_mesh_deform {
+    const struct psc_influence *influences; /* `influence_count` for each vertex; NULL: no skin */
+    uint32_t influence_count;               /* 0, 4 or 8 */
+    const struct psc_delta *const *targets; /* vertices increase within each */
+    const uint32_t *delta_counts;
+    uint32_t target_count;
+};
+
 struct psc_mesh {
     const float (*positions)[3];
     const float (*normals)[3];  /* NULL: flat normals are generated (vertices are split) */
@@ -39,18 +48,28 @@ uint32_t psc_builder_add_light(struct psc_builder *builder, const struct psc_lig
 uint32_t psc_builder_add_camera(struct psc_builder *builder, const struct psc_camera *camera);
 void psc_builder_add_warning(struct psc_builder *builder, const char *format, ...)
     __attribute__((format(printf, 2, 3)));
-void psc_builder_set_animations(struct psc_builder *builder, uint32_t count);
+/* Items of a section of motion.h; returns the number of the first. */
+uint32_t psc_builder_add_motion(
+    struct psc_builder *builder, enum psc_section_id section, const void *items, uint32_t count);
 
 /* Adds triangles. Degenerate ones are kept; an index out of range, a non-finite position or more
  * than 2^31 indices in total fails with PEN_INVALID. */
 bool psc_builder_add_mesh(struct psc_builder *builder, const struct psc_mesh *mesh,
     uint32_t *primitive, struct pen_error *error);
+/* The same of a mesh that moves, given before morphing and skinning. Fills what the builder knows of
+ * *deform: the caller completes and adds it, and renderer/pose/bake.h makes the rest pose. */
+bool psc_builder_add_deforming(struct psc_builder *builder, const struct psc_mesh *mesh,
+    const struct psc_mesh_deform *how, struct psc_deform *deform, struct pen_error *error);
 /* world: row-major 3x4, of the vertices as they were given. What lies far from the world's origin is
- * kept relative to one that psc_builder_finish chooses. */
-void psc_builder_add_instance(
+ * kept relative to one that psc_builder_finish chooses. Each returns the instance's number. */
+uint32_t psc_builder_add_instance(
     struct psc_builder *builder, uint32_t primitive, const float world[12]);
-void psc_builder_place_instance(
+uint32_t psc_builder_place_instance(
     struct psc_builder *builder, uint32_t primitive, const double world[12]);
+/* One whose vertices joints place: `min`, `max` are its bounds in the file's world at rest. */
+uint32_t psc_builder_place_skinned(
+    struct psc_builder *builder, uint32_t primitive, const double min[3], const double max[3]);
+void psc_builder_hide_instance(struct psc_builder *builder, uint32_t instance);
 
 /* A default material: base colour white, roughness 1, metallic 0, no textures. */
 struct psc_material psc_material_default(void);

@@ -54,3 +54,5 @@ static inline double world_determinant(const float m[12])
 
 /* True when every index, meshlet, primitive and instance of the scene is in range and finite. */
 bool psc_check_geometry(const struct psc_scene *scene, struct pen_error *error);
+/* The same of what moves, against a scene whose geometry passed. */
+bool psc_check_motion(const struct psc_scene *scene, struct pen_error *error);

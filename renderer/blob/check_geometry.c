@@ -74,11 +74,12 @@ static bool check_instances(const struct psc_scene *scene, struct pen_error *err
         if (!all_finite(instance->world, 12))
             return DAMAGED(error, "an instance's transform is not finite.");
         if (instance->primitive >= scene->primitive_count ||
-            instance->flags & ~(uint32_t)PSC_MIRRORED)
+            instance->flags & ~(uint32_t)(PSC_MIRRORED | PSC_HIDDEN))
             return DAMAGED(error, "an instance's primitive or flags are unknown.");
-        if ((world_determinant(instance->world) < 0) != (instance->flags == PSC_MIRRORED))
+        if ((world_determinant(instance->world) < 0) != ((instance->flags & PSC_MIRRORED) != 0))
             return DAMAGED(error, "an instance's mirror flag contradicts its transform.");
-        triangles += scene->primitives[instance->primitive].index_count / 3;
+        if (!(instance->flags & PSC_HIDDEN))
+            triangles += scene->primitives[instance->primitive].index_count / 3;
     }
     const struct psc_header *header = scene->header;
     if (triangles != header->triangles)

@@ -1,5 +1,6 @@
 /* What the builder does to one mesh; private to renderer/blob. */
 #pragma once
+#include "renderer/blob/bounds.h"
 #include "renderer/blob/builder.h"
 
 /* A mesh on its way into the builder: arrays of its own, indices relative to it. */
@@ -9,13 +10,11 @@ struct geometry {
     float (*tangents)[4]; /* unit, w +-1; NULL: none */
     float (*uv)[2][2];
     uint8_t (*colors)[4];
+    uint32_t *sources; /* the caller's vertex that each was made of */
     uint32_t vertex_count, vertex_capacity;
     uint32_t *indices;
     uint32_t index_count;
 };
-
-/* Unit normal in double precision; false for a triangle without area. */
-bool psc_triangle_normal(const float a[3], const float b[3], const float c[3], double normal[3]);
 
 /* Copies and checks `mesh`; generates flat normals (which split every vertex) and tangents. */
 bool psc_geometry_create(
@@ -24,9 +23,6 @@ void psc_geometry_finish(struct geometry *geometry);
 
 /* Fills geometry->tangents from uv set 0; vertices used with both handednesses are split. */
 void psc_geometry_make_tangents(struct geometry *geometry);
-
-/* Bounding sphere and normal cone of the triangles in m's index range; conservative. */
-void psc_meshlet_bound(struct psc_meshlet *m, const float (*positions)[3], const uint32_t *indices);
 
 /* enum psc_primitive_flags. Watertight: every edge, vertices joined by position, is shared by exactly
  * two triangles that run through it in opposite directions. Triangles without three distinct corners

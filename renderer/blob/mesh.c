@@ -121,17 +121,17 @@ static void flat_normals(struct geometry *g)
     }
 }
 
-/* sources[i]: the caller's vertex that becomes ours number i. Primitives cut from one large vertex
- * buffer name few of its vertices: the others are left behind. */
-static void choose_vertices(struct geometry *g, const struct psc_mesh *mesh, uint32_t **sources)
+/* Primitives cut from one large vertex buffer name few of its vertices: the others are left behind.
+ */
+static void choose_vertices(struct geometry *g, const struct psc_mesh *mesh)
 {
     g->index_count = mesh->index_count;
     g->indices = pen_alloc(g->index_count, sizeof *g->indices);
     if (!mesh->normals) { /* flat: every corner is a vertex of its own */
         g->vertex_count = mesh->index_count;
-        *sources = pen_alloc(g->vertex_count, sizeof **sources);
+        g->sources = pen_alloc(g->vertex_count, sizeof *g->sources);
         for (uint32_t i = 0; i < g->index_count; i++) {
-            (*sources)[i] = mesh->indices ? mesh->indices[i] : i;
+            g->sources[i] = mesh->indices ? mesh->indices[i] : i;
             g->indices[i] = i;
         }
         return;
@@ -140,11 +140,11 @@ static void choose_vertices(struct geometry *g, const struct psc_mesh *mesh, uin
     memset(ours, 0, mesh->vertex_count * sizeof *ours);
     for (uint32_t i = 0; i < g->index_count; i++)
         ours[mesh->indices ? mesh->indices[i] : i] = 1;
-    *sources = pen_alloc(mesh->vertex_count, sizeof **sources);
+    g->sources = pen_alloc(mesh->vertex_count, sizeof *g->sources);
     for (uint32_t v = 0; v < mesh->vertex_count; v++)
         if (ours[v]) {
             ours[v] = g->vertex_count;
-            (*sources)[g->vertex_count++] = v;
+            g->sources[g->vertex_count++] = v;
         }
     for (uint32_t i = 0; i < g->index_count; i++)
         g->indices[i] = ours[mesh->indices ? mesh->indices[i] : i];
@@ -156,8 +156,7 @@ bool psc_geometry_create(struct geometry *g, const struct psc_mesh *mesh, struct
     memset(g, 0, sizeof *g);
     if (!check_mesh(mesh, error))
         return false;
-    uint32_t *sources;
-    choose_vertices(g, mesh, &sources);
+    choose_vertices(g, mesh);
     uint32_t n = g->vertex_capacity = g->vertex_count;
     g->positions = pen_alloc(n, sizeof *g->positions);
     g->normals = pen_alloc(n, sizeof *g->normals);
@@ -167,7 +166,7 @@ bool psc_geometry_create(struct geometry *g, const struct psc_mesh *mesh, struct
         g->tangents = pen_alloc(n, sizeof *g->tangents);
 
     for (uint32_t i = 0; i < n; i++) {
-        uint32_t from = sources[i];
+        uint32_t from = g->sources[i];
         memcpy(g->positions[i], mesh->positions[from], sizeof g->positions[i]);
         if (mesh->normals)
             memcpy(g->normals[i], mesh->normals[from], sizeof g->normals[i]);
@@ -180,7 +179,6 @@ bool psc_geometry_create(struct geometry *g, const struct psc_mesh *mesh, struct
         for (int k = 0; k < 4; k++)
             g->colors[i][k] = mesh->colors ? unorm8(mesh->colors[from][k]) : 255;
     }
-    free(sources);
 
     if (!mesh->normals)
         flat_normals(g);
@@ -200,6 +198,7 @@ void psc_geometry_finish(struct geometry *g)
     free(g->tangents);
     free(g->uv);
     free(g->colors);
+    free(g->sources);
     free(g->indices);
     memset(g, 0, sizeof *g);
 }

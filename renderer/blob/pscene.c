@@ -15,10 +15,19 @@ _Static_assert(sizeof(struct psc_texture_ref) == 32, "psc_texture_ref has paddin
 _Static_assert(sizeof(struct psc_material) == 232, "psc_material has padding");
 _Static_assert(sizeof(struct psc_camera) == 128, "psc_camera has padding");
 _Static_assert(sizeof(struct psc_light) == sizeof(struct pen_light) + 64, "psc_light has padding");
+_Static_assert(sizeof(struct psc_rider) == 72, "psc_rider has padding");
+_Static_assert(sizeof(struct psc_joint) == 52, "psc_joint has padding");
+_Static_assert(sizeof(struct psc_deform) == 40, "psc_deform has padding");
+_Static_assert(sizeof(struct psc_bind) == 40, "psc_bind has padding");
+_Static_assert(sizeof(struct psc_delta) == 40, "psc_delta has padding");
+_Static_assert(sizeof(struct psc_animation) == 72, "psc_animation has padding");
+_Static_assert(sizeof(struct psc_sampler) == 20, "psc_sampler has padding");
+_Static_assert(sizeof(struct psc_material_rest) == 120, "psc_material_rest has padding");
+_Static_assert(sizeof(struct psc_light_rest) == 28, "psc_light_rest has padding");
+_Static_assert(sizeof(struct psc_node) == 160, "psc_node has padding");
 _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "the blob is little-endian");
 
-static const uint32_t item_bytes[PSC_SECTIONS] = {
-    [PSC_POSITIONS] = 12,
+static const uint32_t item_bytes[PSC_SECTIONS] = {[PSC_POSITIONS] = 12,
     [PSC_ATTRIBUTES] = sizeof(struct psc_attributes),
     [PSC_INDICES] = 4,
     [PSC_MESHLETS] = sizeof(struct psc_meshlet),
@@ -31,6 +40,9 @@ static const uint32_t item_bytes[PSC_SECTIONS] = {
     [PSC_LIGHTS] = sizeof(struct psc_light),
     [PSC_CAMERAS] = sizeof(struct psc_camera),
     [PSC_WARNINGS] = 1,
+#define X(id, name, type) [PSC_##id] = sizeof(type),
+    PSC_MOTION_SECTIONS(X)
+#undef X
 };
 
 static bool is_point(const double p[3])
@@ -180,7 +192,10 @@ bool psc_open_memory(
         .lights = AT(PSC_LIGHTS),
         .cameras = AT(PSC_CAMERAS),
         .warnings = AT(PSC_WARNINGS),
-        .vertex_count = COUNT(PSC_POSITIONS),
+#define X(id, name, type) .motion.name##s = AT(PSC_##id), .motion.name##_count = COUNT(PSC_##id),
+        PSC_MOTION_SECTIONS(X)
+#undef X
+            .vertex_count = COUNT(PSC_POSITIONS),
         .index_count = COUNT(PSC_INDICES),
         .meshlet_count = COUNT(PSC_MESHLETS),
         .primitive_count = COUNT(PSC_PRIMITIVES),
@@ -198,7 +213,8 @@ bool psc_open_memory(
 #undef AT
 #undef COUNT
     if (!check_materials(&found, error) || !check_images(&found, error) ||
-        !check_views(&found, error) || !psc_check_geometry(&found, error))
+        !check_views(&found, error) || !psc_check_geometry(&found, error) ||
+        !psc_check_motion(&found, error))
         return false;
     *scene = found;
     return true;

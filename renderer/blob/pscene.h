@@ -3,12 +3,13 @@
  * All numbers are little-endian; sections start on 64-byte boundaries; all floats are finite. */
 #pragma once
 #include "protocol/request.h"
+#include "renderer/blob/motion.h"
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
 #define PSC_MAGIC "PSCENE\r\n"
-#define PSC_VERSION 4u
+#define PSC_VERSION 5u
 #define PSC_MESHLET_TRIANGLES 128u /* at most, per meshlet */
 
 enum psc_section_id {
@@ -25,7 +26,10 @@ enum psc_section_id {
     PSC_LIGHTS,     /* struct psc_light */
     PSC_CAMERAS,    /* struct psc_camera */
     PSC_WARNINGS,   /* char: import warnings, each ended by NUL */
-    PSC_SECTIONS
+#define X(id, name, type) PSC_##id, /* motion.h */
+    PSC_MOTION_SECTIONS(X)
+#undef X
+        PSC_SECTIONS
 };
 
 struct psc_section {
@@ -45,9 +49,8 @@ struct psc_header {
     float bounds_max[3];
     float extent_min[3]; /* the same of what was uploaded: points and lines without thickness */
     float extent_max[3];
-    uint64_t triangles;  /* over all instances */
-    uint32_t animations; /* in the source; only the rest pose is kept */
-    uint32_t reserved;
+    uint64_t triangles; /* over all instances that are not hidden, as are the bounds */
+    uint64_t reserved;
     struct psc_section sections[PSC_SECTIONS];
 };
 
@@ -84,7 +87,10 @@ struct psc_primitive {
     float offset[3];
 };
 
-enum psc_instance_flags { PSC_MIRRORED = 1 }; /* negative determinant: winding is flipped */
+enum psc_instance_flags {
+    PSC_MIRRORED = 1, /* negative determinant: winding is flipped */
+    PSC_HIDDEN = 2,   /* neither drawn nor casting; an animation may show it */
+};
 
 struct psc_instance {
     float world[12]; /* row-major 3x4: world = M * (object, 1) */
@@ -158,6 +164,7 @@ struct psc_scene {
     const struct psc_light *lights;
     const struct psc_camera *cameras;
     const char *warnings;
+    struct psc_motion motion;
     uint32_t vertex_count, index_count, meshlet_count, primitive_count, instance_count,
         material_count, texture_count, image_count, light_count, camera_count;
     uint64_t texel_bytes, warning_bytes;

@@ -57,12 +57,14 @@ static uint32_t copy_vertex(struct geometry *g, uint32_t from)
         g->normals = pen_realloc_array(g->normals, n, sizeof *g->normals);
         g->uv = pen_realloc_array(g->uv, n, sizeof *g->uv);
         g->colors = pen_realloc_array(g->colors, n, sizeof *g->colors);
+        g->sources = pen_realloc_array(g->sources, n, sizeof *g->sources);
     }
     uint32_t to = g->vertex_count++;
     memcpy(g->positions[to], g->positions[from], sizeof g->positions[to]);
     memcpy(g->normals[to], g->normals[from], sizeof g->normals[to]);
     memcpy(g->uv[to], g->uv[from], sizeof g->uv[to]);
     memcpy(g->colors[to], g->colors[from], sizeof g->colors[to]);
+    g->sources[to] = g->sources[from];
     return to;
 }
 

@@ -3,6 +3,7 @@
 #include "renderer/import/bundle.h"
 #include "renderer/import/convert/convert.h"
 #include "renderer/import/image/image.h"
+#include "renderer/pose/bake.h"
 #include <stdlib.h>
 #include <string.h>
 
@@ -128,5 +129,9 @@ bool pen_import(const uint8_t *data, size_t bytes, enum pen_import_mode mode,
         (mode == PEN_IMPORT_IMAGE ? import_image : import_scene)(builder, data, bytes, error) &&
         psc_builder_finish(builder, source, blob, blob_bytes, error);
     psc_builder_destroy(builder);
-    return done;
+    if (!done || pose_bake(*blob, blob_bytes, error))
+        return done;
+    free(*blob);
+    *blob = NULL;
+    return false;
 }

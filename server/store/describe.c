@@ -38,7 +38,7 @@ static char *describe_scene(
         .materials = scene->material_count,
         .textures = scene->texture_count,
         .images = scene->image_count,
-        .animations = scene->header->animations,
+        .animations = scene->motion.animation_count,
         .triangles = scene->header->triangles,
         .camera_count = scene->camera_count,
         .light_count = scene->light_count,

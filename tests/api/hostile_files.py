@@ -402,6 +402,102 @@ def archives():
     yield "data-length.bundle", packed[:24] + struct.pack("<Q", 2 ** 64 - 1) + packed[32:]
 
 
+def moving(extra=b"", accessors=(), views=(), primitive=None, nodes=None, **changes):
+    """A triangle with what is named beside it in the buffer: accessor 1 and on, view 1 and on."""
+    return gltf(
+        buffers=[{"byteLength": 36 + len(extra), "uri": data_uri(TRIANGLE + extra)}],
+        bufferViews=[{"buffer": 0, "byteLength": 36}] +
+        ([{"buffer": 0, "byteOffset": 36, "byteLength": len(extra)}] if extra else []) + list(views),
+        accessors=[{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}] +
+        list(accessors),
+        nodes=nodes or [{"mesh": 0}],
+        meshes=[{"primitives": [{"attributes": {"POSITION": 0}, **(primitive or {})}]}], **changes)
+
+
+def floats(kind, values, offset=0, count=None, **more):
+    """An accessor over view 1."""
+    size = {"SCALAR": 1, "VEC3": 3, "VEC4": 4, "MAT4": 16}[kind]
+    return {"bufferView": 1, "byteOffset": offset, "componentType": 5126, "type": kind,
+            "count": count or len(values) // size, **more}
+
+
+def animated(times, values, interpolation="LINEAR", kind="VEC3", sampler=None, channel=None):
+    extra = struct.pack("<%df" % (len(times) + len(values)), *times, *values)
+    return moving(extra, [floats("SCALAR", times), floats(kind, values, 4 * len(times))],
+                  animations=[{"samplers": [{"input": 1, "output": 2, **(
+                      sampler or {"interpolation": interpolation})}], "channels": [{
+                          "sampler": 0, "target": {"node": 0, "path": "translation"},
+                          **(channel or {})}]}])
+
+
+def skinned(joints=(0, 0, 0, 0) * 3, weights=(1.0, 0, 0, 0) * 3, matrix=None, kind="MAT4", **skin):
+    matrix = matrix or (1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1)
+    extra = (struct.pack("<12f", *weights) + struct.pack("<12H", *joints) +
+             struct.pack("<16f", *matrix))
+    return moving(extra, [
+        floats("VEC4", weights), {"bufferView": 1, "byteOffset": 48, "componentType": 5123,
+                                  "type": "VEC4", "count": 3},
+        floats(kind, matrix, 72)],
+                  primitive={"attributes": {"POSITION": 0, "WEIGHTS_0": 1, "JOINTS_0": 2}},
+                  nodes=[{"mesh": 0, "skin": 0}],
+                  skins=[{"joints": [0], "inverseBindMatrices": 3, **skin}])
+
+
+def motions():
+    nan, far = float("nan"), float("inf")
+    still = [0.0] * 9
+    yield "time-nan.gltf", animated([0, nan, 2], still)
+    yield "time-infinite.gltf", animated([0, 1, far], still)
+    yield "time-unsorted.gltf", animated([0, 2, 1], still)
+    yield "key-nan.gltf", animated([0, 1, 2], [0, 0, nan] * 3)
+    yield "keys-short.gltf", animated([0, 1, 2], still[:6])
+    yield "keys-short-cubic.gltf", animated([0, 1, 2], still, "CUBICSPLINE")
+    yield "keys-scalar.gltf", animated([0, 1, 2], still, kind="SCALAR")
+    yield "interpolation.gltf", animated([0, 1, 2], still, "BEZIER")
+    yield "channel-sampler.gltf", animated([0, 1, 2], still, channel={"sampler": 1})
+    yield "channel-node.gltf", animated([0, 1, 2], still, channel={
+        "target": {"node": 1, "path": "translation"}})
+    yield "channel-no-path.gltf", animated([0, 1, 2], still, channel={"target": {"node": 0}})
+    yield "sampler-accessor.gltf", animated([0, 1, 2], still, sampler={"output": 3})
+    yield "times-integers.gltf", moving(bytes(48), [
+        {"bufferView": 1, "componentType": 5123, "count": 3, "type": "SCALAR"},
+        floats("VEC3", still, 12)], animations=[{"samplers": [{"input": 1, "output": 2}], "channels":
+            [{"sampler": 0, "target": {"node": 0, "path": "scale"}}]}])
+    endless = [{"componentType": 5126, "count": 2 ** 31 - 1, "type": t} for t in ("SCALAR", "VEC3")]
+    yield "keys-endless.gltf", moving(accessors=endless, animations=[{
+        "samplers": [{"input": 1, "output": 2}],
+        "channels": [{"sampler": 0, "target": {"node": 0, "path": "scale"}}]}])
+    many = [{"componentType": 5126, "count": 10 ** 6, "type": t} for t in ("SCALAR", "VEC3")]
+    yield "keys-many-times.gltf", moving(accessors=many, animations=[{
+        "samplers": [{"input": 1, "output": 2}] * 1000, "channels": [
+            {"sampler": i, "target": {"path": "scale"}} for i in range(1000)]}])
+    yield "animations-many.gltf", gltf(animations=[{"samplers": [], "channels": []}] * 20000)
+    yield "joint-cycle.gltf", gltf(
+        nodes=[{"mesh": 0, "skin": 0}, {"children": [2]}, {"children": [1]}],
+        skins=[{"joints": [1, 2]}])
+    yield "joints-million.gltf", gltf(nodes=[{"mesh": 0, "skin": 0}], skins=[{"joints": [0] * 10 ** 6}])
+    yield "joints-none.gltf", skinned().replace(b'"joints": [0]', b'"joints": []')
+    yield "joint-missing.gltf", gltf(skins=[{"joints": [0, 7]}])
+    yield "joint-beyond.gltf", skinned(joints=(0, 0, 0, 0, 9, 0, 0, 0, 0, 0, 0, 0))
+    yield "weight-nan.gltf", skinned(weights=(1, 0, 0, 0, nan, 0, 0, 0, 1, 0, 0, 0))
+    yield "matrix-nan.gltf", skinned(matrix=(nan,) * 16)
+    yield "matrix-far.gltf", skinned(matrix=(3e38,) * 16)
+    yield "matrix-type.gltf", skinned(kind="VEC4")
+    yield "matrices-few.gltf", skinned().replace(b'"joints": [0]', b'"joints": [0, 0]')
+    yield "target-short.gltf", moving(bytes(12), [floats("VEC3", [], count=1)], primitive={
+        "targets": [{"POSITION": 1}]}, nodes=[{"mesh": 0, "weights": [1]}])
+    yield "target-nan.gltf", moving(struct.pack("<9f", *[nan] * 9), [floats("VEC3", still)],
+                                    primitive={"targets": [{"POSITION": 1}]},
+                                    nodes=[{"mesh": 0, "weights": [1]}])
+    yield "target-far.gltf", moving(struct.pack("<9f", *[9e11] * 9), [floats("VEC3", still)],
+                                    primitive={"targets": [{"POSITION": 1}]},
+                                    nodes=[{"mesh": 0, "weights": [1e30]}])
+    yield "target-missing.gltf", moving(primitive={"targets": [{"POSITION": 8}]})
+    yield "target-text.gltf", moving(primitive={"targets": ["POSITION"]})
+    yield "targets-many.gltf", moving(primitive={"targets": [{"POSITION": 0}] * 2000}, nodes=[
+        {"mesh": 0, "weights": [0.5]} for _ in range(600)], scenes=[{"nodes": list(range(600))}])
+
+
 # Broken by the letter, but drawn, with a warning: what they mean is plain, or only an image is lost.
 TOLERATED = frozenset("""accessor-count-zero image-no-source mime-gif mime-text node-root-is-child
     node-root-twice truncated-image uri-not-base64-told-image uri-short-image""".split())
@@ -409,7 +505,7 @@ TOLERATED = frozenset("""accessor-count-zero image-no-source mime-gif mime-text 
 
 def files(tolerated=False):
     for group in (references, arithmetic, numbers, graphs, shapes, binaries, pictures, compressed,
-                  archives):
+                  archives, motions):
         for name, data in group():
             if (os.path.splitext(name)[0] in TOLERATED) == tolerated:
                 yield name, data

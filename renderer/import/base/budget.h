@@ -28,6 +28,16 @@
 
 #define IMP_MAX_DRACO_BYTES (1024ull << 20) /* unpacked, all attributes together */
 
+#define IMP_MAX_JOINTS 65536u /* of one skin: what a vertex can name */
+#define IMP_MAX_TOTAL_JOINTS 1000000u
+#define IMP_MAX_DEFORMING 4000000ull      /* vertices with a skin or morph targets */
+#define IMP_MAX_MORPH_TARGETS 400000u     /* of all primitives that are drawn */
+#define IMP_MAX_MORPH_VALUES 128000000ull /* their vertices, moved or not */
+#define IMP_MAX_DELTAS 8000000ull         /* those that are moved; 40 bytes each */
+#define IMP_MAX_ANIMATIONS 16384u
+#define IMP_MAX_CHANNELS 262144u /* of all animations; of samplers likewise */
+#define IMP_MAX_KEYS 16000000ull /* numbers in all keys */
+
 #define IMP_MAX_IMAGES 4096u
 #define IMP_MAX_IMAGE_PIXELS (64ull << 20)  /* px, one image */
 #define IMP_MAX_TOTAL_PIXELS (256ull << 20) /* px, all images as uploaded */

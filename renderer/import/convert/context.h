@@ -48,6 +48,8 @@ struct imp_context {
         float min[3], max[3];
     } * primitive_bounds; /* object space, by glTF primitive */
 
+    struct imp_motion *motion; /* motion.h */
+
     uint64_t *warned; /* hashes of the warnings given */
     uint32_t warned_count;
 };

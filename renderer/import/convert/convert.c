@@ -5,6 +5,7 @@
 #include "renderer/import/convert/mesh.h"
 #include "renderer/import/convert/node.h"
 #include "renderer/import/convert/texture.h"
+#include "renderer/import/motion/motion.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -41,10 +42,6 @@ bool imp_convert(struct imp_document *document, struct gltf_model *model,
     if (model->scene_count > 1)
         imp_warn(&context, "The glTF has %u scenes; scene %u is used.", model->scene_count,
             model->scene);
-    if (document->animation_count) {
-        imp_warn(&context, "Animations are not played: nodes stay where the file puts them.");
-        psc_builder_set_animations(builder, document->animation_count);
-    }
     if (!imp_primitives_fit(model, error) || !imp_add_nodes(&context, error))
         goto fail;
     imp_material(&context, -1); /* a blob has at least one material */
@@ -57,6 +54,7 @@ fail:
     free(context.textures);
     free(context.image_slots);
     free(context.primitive_bounds);
+    imp_motion_free(context.motion);
     free(context.stamps);
     free(context.stamped);
     free(context.warned);

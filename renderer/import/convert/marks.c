@@ -135,10 +135,14 @@ static void take_attributes(struct solid *s, const struct imp_geometry *given)
     s->g.colors = given->colors ? pen_alloc_zero(n, sizeof *s->g.colors) : NULL;
     for (uint32_t v = 0; given->colors && v < n; v++)
         memcpy(s->g.colors[v], given->colors[s->from[v]], sizeof *s->g.colors);
+    s->g.used = pen_alloc_zero(n, sizeof *s->g.used);
+    s->g.used_of = given->used_of;
+    for (uint32_t v = 0; v < n; v++)
+        s->g.used[v] = given->used[s->from[v]];
 }
 
-bool imp_marks_thicken(struct imp_context *context, struct imp_geometry *g, uint32_t mode,
-    float (**points)[3], struct pen_error *error)
+bool imp_marks_thicken(
+    struct imp_context *context, struct imp_geometry *g, uint32_t mode, struct pen_error *error)
 {
     uint32_t corners = g->index_count;
     uint32_t bars = mode == POINTS  ? 0
@@ -168,7 +172,8 @@ bool imp_marks_thicken(struct imp_context *context, struct imp_geometry *g, uint
     }
     take_attributes(&s, g);
     free(s.from);
-    *points = g->positions;
+    s.g.points = g->positions;
+    s.g.point_count = g->vertex_count;
     g->positions = NULL;
     imp_geometry_finish(g);
     *g = s.g;

@@ -3,6 +3,6 @@
 #include "renderer/import/geometry/geometry.h"
 
 /* Makes solids of points and lines (glTF's modes 0 to 3), whose corners stand in `indices`.
- * *points, to be freed, are the positions as they were. Errors: PEN_TOO_BIG. */
+ * The positions as they were become its `points`. Errors: PEN_TOO_BIG. */
 bool imp_marks_thicken(struct imp_context *context, struct imp_geometry *geometry, uint32_t mode,
-    float (**points)[3], struct pen_error *error);
+    struct pen_error *error);

@@ -1,10 +1,9 @@
 #include "renderer/import/convert/material.h"
 #include "renderer/import/convert/texture.h"
+#include "renderer/pose/place.h"
 #include <math.h>
 #include <string.h>
 
-/* KHR_texture_transform as uv' = T R S uv. The angle turns counter-clockwise as seen with v
- * pointing down, hence the signs: what the text of the extension says and viewers do. */
 static struct psc_texture_ref texture_ref(
     struct imp_context *context, const struct gltf_texture_info *info, enum imp_role role)
 {
@@ -17,17 +16,25 @@ static struct psc_texture_ref texture_ref(
             info->uv_set);
     else
         ref.uv_set = info->uv_set;
-    float c = cosf(info->rotation), s = sinf(info->rotation);
-    const float transform[6] = {c * info->scale[0], s * info->scale[1], info->offset[0],
-        -s * info->scale[0], c * info->scale[1], info->offset[1]};
-    for (int i = 0; i < 6; i++)
-        if (!isfinite(transform[i]))
-            return ref; /* the identity */
-    memcpy(ref.transform, transform, sizeof transform);
     return ref;
 }
 
 #define STRONGEST 25 /* of 0.04: everything is reflected */
+
+static struct psc_map_rest map_rest(const struct gltf_texture_info *info)
+{
+    return (struct psc_map_rest){
+        {info->offset[0], info->offset[1]}, info->rotation, {info->scale[0], info->scale[1]}};
+}
+
+struct psc_material_rest imp_material_rest(const struct gltf_material *from)
+{
+    return (struct psc_material_rest){
+        .emissive = {from->emissive[0], from->emissive[1], from->emissive[2]},
+        .emissive_strength = from->emissive_strength,
+        .maps = {map_rest(&from->base), map_rest(&from->surface), map_rest(&from->normal),
+            map_rest(&from->occlusion), map_rest(&from->emission)}};
+}
 
 static float clamp01(float x)
 {
@@ -37,18 +44,15 @@ static float clamp01(float x)
 static struct psc_material convert(struct imp_context *context, const struct gltf_material *from)
 {
     struct psc_material to = psc_material_default();
-    for (int i = 0; i < 4; i++)
-        to.base_color[i] = clamp01(from->base_color[i]);
-    for (int i = 0; i < 3; i++) {
-        to.emissive[i] = fminf(fmaxf(from->emissive[i] * from->emissive_strength, 0), 1e9f);
+    memcpy(to.base_color, from->base_color, sizeof to.base_color);
+    for (int i = 0; i < 3; i++)
         to.specular[i] =
             fminf(fmaxf(from->specular[i], 0), from->specular_glossiness ? 1 : STRONGEST);
-    }
-    to.metallic = clamp01(from->metallic);
-    to.roughness = clamp01(from->roughness);
+    to.metallic = from->metallic;
+    to.roughness = from->roughness;
     to.glossiness = clamp01(from->glossiness);
     to.normal_scale = from->normal_scale;
-    to.occlusion_strength = clamp01(from->occlusion_strength);
+    to.occlusion_strength = from->occlusion_strength;
     to.alpha_cutoff = from->alpha_cutoff;
     if (!strcmp(from->alpha_mode, "MASK"))
         to.alpha_mode = PSC_MASK;
@@ -64,6 +68,8 @@ static struct psc_material convert(struct imp_context *context, const struct glt
     to.normal = texture_ref(context, &from->normal, IMP_NORMAL);
     to.occlusion = texture_ref(context, &from->occlusion, IMP_OCCLUSION);
     to.emission = texture_ref(context, &from->emission, IMP_EMISSION);
+    const struct psc_material_rest rest = imp_material_rest(from);
+    pose_finish_material(&to, &rest);
     return to;
 }
 

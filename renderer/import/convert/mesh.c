@@ -25,7 +25,8 @@ static uint32_t corner(const struct corners *corners, uint32_t i)
     return corners->indexed ? imp_read_index(&corners->indices, i) : i;
 }
 
-/* Points and lines keep their corners as they are; unrolls strips and fans: section 3.7.2.1 of the glTF 2.0 specification. */
+/* Points and lines keep their corners as they are; unrolls strips and fans: section 3.7.2.1 of the
+ * glTF 2.0 specification. */
 static void unroll(struct imp_geometry *g, const struct corners *corners, uint32_t mode)
 {
     uint32_t n = corners->count, out = 0;
@@ -100,9 +101,9 @@ static bool read_triangles(struct imp_context *context, struct imp_geometry *g,
     return true;
 }
 
-/* Renumbers the vertices that the triangles use, in order of first use, and returns the list of
- * their old numbers. Some files share one large vertex buffer among thousands of primitives. */
-static uint32_t *compact(struct imp_context *context, struct imp_geometry *g, uint32_t total)
+/* Renumbers the vertices that the triangles use, in order of first use, and keeps their old numbers.
+ * Some files share one large vertex buffer among thousands of primitives. */
+static void compact(struct imp_context *context, struct imp_geometry *g, uint32_t total)
 {
     if (context->stamp_capacity < total) {
         free(context->stamps);
@@ -114,24 +115,21 @@ static uint32_t *compact(struct imp_context *context, struct imp_geometry *g, ui
     }
     uint32_t stamp = ++context->stamp;
     uint32_t most = g->index_count < total ? g->index_count : total;
-    uint32_t *used = pen_alloc_zero(most, sizeof *used);
+    g->used = pen_alloc_zero(most, sizeof *g->used);
     g->vertex_count = 0;
     for (uint32_t i = 0; i < g->index_count; i++) {
         uint32_t old = g->indices[i];
         if (context->stamps[old] != stamp) {
             context->stamps[old] = stamp;
             context->stamped[old] = g->vertex_count;
-            used[g->vertex_count++] = old;
+            g->used[g->vertex_count++] = old;
         }
         g->indices[i] = context->stamped[old];
     }
-    return used;
 }
 
-/* Reads `components` floats of each used vertex; NULL in *out when the primitive has no such
- * attribute. Those that the accessor lacks are 1. */
-static bool gather(struct imp_context *context, int32_t accessor, uint32_t least, uint32_t total,
-    const uint32_t *used, uint32_t count, uint32_t components, void *out, struct pen_error *error)
+bool imp_gather(struct imp_context *context, const struct imp_geometry *g, int32_t accessor,
+    uint32_t least, uint32_t components, void *out, struct pen_error *error)
 {
     struct imp_reader reader;
     char pointer[64];
@@ -143,16 +141,16 @@ static bool gather(struct imp_context *context, int32_t accessor, uint32_t least
     if (reader.components < least || reader.components > components)
         return pen_fail(
             error, PEN_INVALID, pointer, "glTF %s: its type does not suit the attribute.", pointer);
-    if (reader.count < total)
+    if (reader.count < g->used_of)
         return pen_fail(error, PEN_INVALID, pointer,
             "glTF %s: it has fewer elements than the primitive has vertices.", pointer);
-    float *values = pen_alloc_zero((size_t)count * components, sizeof *values);
+    float *values = pen_alloc_zero((size_t)g->vertex_count * components, sizeof *values);
     *(float **)out = values;
-    for (uint32_t i = 0; i < count; i++) {
+    for (uint32_t i = 0; i < g->vertex_count; i++) {
         float *value = values + (size_t)i * components;
         for (uint32_t k = reader.components; k < components; k++)
             value[k] = 1;
-        imp_read_floats(&reader, used[i], value, components);
+        imp_read_floats(&reader, g->used[i], value, components);
     }
     return true;
 }
@@ -160,54 +158,60 @@ static bool gather(struct imp_context *context, int32_t accessor, uint32_t least
 static bool read_vertices(struct imp_context *context, struct imp_geometry *g,
     const struct gltf_primitive *primitive, uint32_t total, struct pen_error *error)
 {
-    uint32_t *used = compact(context, g, total), n = g->vertex_count;
-    bool done = false;
-    if (n > IMP_MAX_VERTICES - context->vertex_count) {
-        pen_fail(
-            error, PEN_TOO_BIG, "", "The scene has more than %llu vertices.", IMP_MAX_VERTICES);
-        goto fail;
-    }
-    context->vertex_count += n;
-    if (!gather(context, primitive->position, 3, total, used, n, 3, &g->positions, error) ||
-        !gather(context, primitive->normal, 3, total, used, n, 3, &g->normals, error) ||
-        !gather(context, primitive->uv[0], 2, total, used, n, 2, &g->uv[0], error) ||
-        !gather(context, primitive->uv[1], 2, total, used, n, 2, &g->uv[1], error) ||
-        !gather(context, primitive->color, 3, total, used, n, 4, &g->colors, error))
-        goto fail;
+    compact(context, g, total);
+    g->used_of = total;
+    if (g->vertex_count > IMP_MAX_VERTICES - context->vertex_count)
+        return too_many_vertices(error);
+    context->vertex_count += g->vertex_count;
+    if (!imp_gather(context, g, primitive->position, 3, 3, &g->positions, error) ||
+        !imp_gather(context, g, primitive->normal, 3, 3, &g->normals, error) ||
+        !imp_gather(context, g, primitive->uv[0], 2, 2, &g->uv[0], error) ||
+        !imp_gather(context, g, primitive->uv[1], 2, 2, &g->uv[1], error) ||
+        !imp_gather(context, g, primitive->color, 3, 4, &g->colors, error))
+        return false;
     /* Without normals the specification wants flat ones, and given tangents ignored. */
-    if (g->normals &&
-        !gather(context, primitive->tangent, 4, total, used, n, 4, &g->tangents, error))
-        goto fail;
-    for (uint32_t i = 0; i < n; i++)
+    if (g->normals && !imp_gather(context, g, primitive->tangent, 4, 4, &g->tangents, error))
+        return false;
+    for (uint32_t i = 0; i < g->vertex_count; i++)
         for (int k = 0; k < 3; k++)
             if (!(fabsf(g->positions[i][k]) <= FARTHEST)) {
                 char pointer[64];
                 snprintf(pointer, sizeof pointer, "/accessors/%d", primitive->position);
-                pen_fail(error, PEN_INVALID, pointer,
+                return pen_fail(error, PEN_INVALID, pointer,
                     "glTF %s: a position is not finite or beyond 1e12 m.", pointer);
-                goto fail;
             }
-    done = true;
-fail:
-    free(used);
-    return done;
+    return true;
 }
 
-/* `points`: what the described bounds are of; NULL: the geometry's own positions. */
-static bool add(struct imp_context *context, uint32_t number, struct imp_geometry *g,
-    const float (*points)[3], uint32_t point_count, uint32_t *psc, struct pen_error *error)
+bool imp_geometry_read(
+    struct imp_context *context, uint32_t number, struct imp_geometry *g, struct pen_error *error)
 {
     const struct gltf_primitive *primitive = &context->model->primitives[number];
-    struct primitive_bounds *bounds = &context->primitive_bounds[number];
-    for (int k = 0; k < 3; k++)
-        bounds->min[k] = bounds->max[k] = g->positions[0][k];
-    for (uint32_t i = 1; i < g->vertex_count; i++)
-        for (int k = 0; k < 3; k++) {
-            bounds->min[k] = fminf(bounds->min[k], g->positions[i][k]);
-            bounds->max[k] = fmaxf(bounds->max[k], g->positions[i][k]);
-        }
-    imp_geometry_optimise(g, &context->optimiser_work);
-    const struct psc_mesh mesh = {.positions = (const float(*)[3])g->positions,
+    struct imp_reader positions;
+    if (primitive->position < 0) {
+        imp_warn(context, "A primitive without positions is not drawn.");
+        return true;
+    }
+    if (!imp_reader_init(&positions, context->document, context->model, primitive->position, error))
+        return false;
+    if (positions.count > IMP_MAX_ACCESSOR)
+        return pen_fail(
+            error, PEN_TOO_BIG, "", "The scene has more than %u vertices.", IMP_MAX_ACCESSOR);
+    if (!read_triangles(context, g, primitive, positions.count, error))
+        return false;
+    if (!g->index_count) {
+        imp_warn(context, "A primitive without any triangle is not drawn.");
+        return true;
+    }
+    return read_vertices(context, g, primitive, positions.count, error) &&
+           (primitive->mode >= TRIANGLES || imp_marks_thicken(context, g, primitive->mode, error));
+}
+
+struct psc_mesh imp_geometry_mesh(
+    struct imp_context *context, uint32_t number, const struct imp_geometry *g)
+{
+    int32_t material = context->model->primitives[number].material;
+    return (struct psc_mesh){.positions = (const float(*)[3])g->positions,
         .normals = (const float(*)[3])g->normals,
         .tangents = (const float(*)[4])g->tangents,
         .uv0 = (const float(*)[2])g->uv[0],
@@ -216,49 +220,42 @@ static bool add(struct imp_context *context, uint32_t number, struct imp_geometr
         .vertex_count = g->vertex_count,
         .indices = g->indices,
         .index_count = g->index_count,
-        .material = imp_material(context, primitive->material),
-        .need_tangents = imp_material_has_normal_map(context, primitive->material),
+        .material = imp_material(context, material),
+        .need_tangents = imp_material_has_normal_map(context, material),
         .meshlet_triangles = g->meshlet_triangles,
         .meshlet_count = g->meshlet_count,
-        .points = points,
-        .point_count = point_count};
+        .points = (const float(*)[3])g->points,
+        .point_count = g->point_count};
+}
+
+static bool add(struct imp_context *context, uint32_t number, struct imp_geometry *g, uint32_t *psc,
+    struct pen_error *error)
+{
+    struct primitive_bounds *bounds = &context->primitive_bounds[number];
+    for (int k = 0; k < 3; k++)
+        bounds->min[k] = bounds->max[k] = g->positions[0][k];
+    for (uint32_t i = 1; i < g->vertex_count; i++)
+        for (int k = 0; k < 3; k++) {
+            bounds->min[k] = fminf(bounds->min[k], g->positions[i][k]);
+            bounds->max[k] = fmaxf(bounds->max[k], g->positions[i][k]);
+        }
+    free(g->used); /* or no two vertices would be equal */
+    g->used = NULL;
+    imp_geometry_optimise(g, &context->optimiser_work);
+    const struct psc_mesh mesh = imp_geometry_mesh(context, number, g);
     return psc_builder_add_mesh(context->builder, &mesh, psc, error);
 }
 
 bool imp_primitive(
     struct imp_context *context, uint32_t number, uint32_t *psc, struct pen_error *error)
 {
-    const struct gltf_primitive *primitive = &context->model->primitives[number];
     *psc = context->primitives[number];
     if (*psc != IMP_NOT_YET)
         return true;
-    *psc = context->primitives[number] = IMP_SKIPPED;
-    if (primitive->position < 0) {
-        imp_warn(context, "A primitive without positions is not drawn.");
-        return true;
-    }
-    if (primitive->morphed)
-        imp_warn(context, "Morph targets are ignored: shapes are drawn at rest.");
-    struct imp_reader positions;
-    if (!imp_reader_init(&positions, context->document, context->model, primitive->position, error))
-        return false;
-    if (positions.count > IMP_MAX_ACCESSOR)
-        return pen_fail(
-            error, PEN_TOO_BIG, "", "The scene has more than %u vertices.", IMP_MAX_ACCESSOR);
+    context->primitives[number] = IMP_SKIPPED;
     struct imp_geometry g = {0};
-    bool done = read_triangles(context, &g, primitive, positions.count, error);
-    bool drawn = done && g.index_count;
-    if (done && !drawn)
-        imp_warn(context, "A primitive without any triangle is not drawn.");
-    float(*points)[3] = NULL;
-    done = done && (!drawn || read_vertices(context, &g, primitive, positions.count, error));
-    uint32_t point_count = g.vertex_count;
-    if (done && drawn && primitive->mode < TRIANGLES)
-        done = imp_marks_thicken(context, &g, primitive->mode, &points, error);
-    if (done && drawn)
-        done = add(context, number, &g, (const float(*)[3])points, point_count,
-            &context->primitives[number], error);
-    free(points);
+    bool done = imp_geometry_read(context, number, &g, error) &&
+                (!g.index_count || add(context, number, &g, &context->primitives[number], error));
     imp_geometry_finish(&g);
     *psc = context->primitives[number];
     return done;

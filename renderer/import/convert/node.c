@@ -6,6 +6,8 @@
 #include "renderer/import/convert/camera.h"
 #include "renderer/import/convert/light.h"
 #include "renderer/import/convert/mesh.h"
+#include "renderer/import/motion/close.h"
+#include "renderer/import/motion/deform.h"
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -98,19 +100,6 @@ static bool check_forest(struct imp_context *context, struct roots *roots, struc
     return done;
 }
 
-static void local_matrix(const struct gltf_node *node, double out[12])
-{
-    if (!node->has_matrix) {
-        psc_affine_trs((const float[3]){0, 0, 0}, node->rotation, node->scale, out);
-        for (int i = 0; i < 3; i++) /* in full: far from the origin a float is coarse */
-            out[4 * i + 3] = node->translation[i];
-        return;
-    }
-    for (int r = 0; r < 3; r++)
-        for (int c = 0; c < 4; c++)
-            out[4 * r + c] = node->matrix[4 * c + r];
-}
-
 static void grow_bounds(
     struct imp_context *context, const struct primitive_bounds *box, const double world[12])
 {
@@ -126,9 +115,61 @@ static void grow_bounds(
     }
 }
 
-static bool add_mesh_at(struct imp_context *context, const struct gltf_node *node, uint32_t number,
-    const double world[12], struct pen_error *error)
+/* A primitive whose vertices move. */
+static bool add_deforming_at(struct imp_context *context, uint32_t number, uint32_t primitive,
+    const double world[12], bool hidden, bool *skinned, uint32_t *instance, struct pen_error *error)
 {
+    struct imp_deformed_primitive added;
+    if (!imp_add_deforming(context, number, primitive, &added, error))
+        return false;
+    *skinned = added.skinned;
+    *instance = IMP_SKIPPED;
+    if (added.psc == IMP_SKIPPED)
+        return true;
+    if (!added.skinned) {
+        *instance = psc_builder_place_instance(context->builder, added.psc, world);
+        return true;
+    }
+    *instance = psc_builder_place_skinned(context->builder, added.psc, added.min, added.max);
+    imp_deforming_instance(context->motion, *instance);
+    for (int k = 0; !hidden && k < 3; k++) {
+        context->bounds_min[k] = fmin(context->bounds_min[k], added.min[k]);
+        context->bounds_max[k] = fmax(context->bounds_max[k], added.max[k]);
+    }
+    return true;
+}
+
+/* One primitive of a node's mesh at a place in the world. `local`: between the node and there, or
+ * NULL. */
+static bool add_primitive_at(struct imp_context *context, uint32_t number, uint32_t primitive,
+    const double world[12], const double local[12], bool hidden, struct pen_error *error)
+{
+    uint32_t psc, instance = IMP_SKIPPED;
+    bool skinned = false;
+    if (imp_deforms(context, &context->model->nodes[number], primitive)) {
+        if (!add_deforming_at(
+                context, number, primitive, world, hidden, &skinned, &instance, error))
+            return false;
+    } else {
+        if (!imp_primitive(context, primitive, &psc, error))
+            return false;
+        if (psc != IMP_SKIPPED)
+            instance = psc_builder_place_instance(context->builder, psc, world);
+    }
+    if (instance == IMP_SKIPPED)
+        return true;
+    if (hidden)
+        psc_builder_hide_instance(context->builder, instance);
+    else if (!skinned)
+        grow_bounds(context, &context->primitive_bounds[primitive], world);
+    imp_motion_ride_instance(context->motion, number, instance, local, skinned);
+    return true;
+}
+
+static bool add_mesh_at(struct imp_context *context, uint32_t number, const double world[12],
+    const double local[12], bool hidden, struct pen_error *error)
+{
+    const struct gltf_node *node = &context->model->nodes[number];
     const struct gltf_mesh *mesh = &context->model->meshes[node->mesh];
     for (int i = 0; i < 12; i++)
         if (!(fabs(world[i]) <= LARGEST))
@@ -138,22 +179,18 @@ static bool add_mesh_at(struct imp_context *context, const struct gltf_node *nod
         return node_fail(
             error, PEN_TOO_BIG, number, "the scene draws too many instances of its meshes");
     context->instance_count += mesh->primitive_count;
-    for (uint32_t i = 0; i < mesh->primitive_count; i++) {
-        uint32_t psc;
-        if (!imp_primitive(context, mesh->first_primitive + i, &psc, error))
+    for (uint32_t i = 0; i < mesh->primitive_count; i++)
+        if (!add_primitive_at(
+                context, number, mesh->first_primitive + i, world, local, hidden, error))
             return false;
-        if (psc == IMP_SKIPPED)
-            continue;
-        psc_builder_place_instance(context->builder, psc, world);
-        grow_bounds(context, &context->primitive_bounds[mesh->first_primitive + i], world);
-    }
     return true;
 }
 
 /* EXT_mesh_gpu_instancing: one instance for each element of the node's TRS accessors. */
-static bool add_instances(struct imp_context *context, const struct gltf_node *node,
-    uint32_t number, const double world[12], struct pen_error *error)
+static bool add_instances(struct imp_context *context, uint32_t number, const double world[12],
+    bool hidden, struct pen_error *error)
 {
+    const struct gltf_node *node = &context->model->nodes[number];
     const int32_t accessors[3] = {
         node->instance_translation, node->instance_rotation, node->instance_scale};
     const uint32_t components[3] = {3, 4, 3};
@@ -181,10 +218,38 @@ static bool add_instances(struct imp_context *context, const struct gltf_node *n
         double local[12], placed[12];
         psc_affine_trs(t, q, s, local);
         psc_affine_multiply(world, local, placed);
-        if (!add_mesh_at(context, node, number, placed, error))
+        if (!add_mesh_at(context, number, placed, local, hidden, error))
             return false;
     }
     return true;
+}
+
+/* `punctual`: its number among those of KHR_lights_punctual, or -1. */
+static void add_light(struct imp_context *context, const struct gltf_light *light, int32_t punctual,
+    uint32_t number, const double world[12], bool hidden)
+{
+    float size[2];
+    uint32_t psc = imp_add_light(context, light, &context->model->nodes[number], world, hidden);
+    if (psc == IMP_SKIPPED)
+        return;
+    imp_light_size(light, size);
+    imp_motion_ride(context->motion, number, PSC_RIDER_LIGHT, psc, size);
+    if (punctual >= 0)
+        imp_motion_use_light(context->motion, (struct imp_use){(uint32_t)punctual, psc, number});
+}
+
+static void add_camera(struct imp_context *context, uint32_t number, const double world[12])
+{
+    const struct gltf_node *node = &context->model->nodes[number];
+    const struct gltf_camera *camera = &context->model->cameras[node->camera];
+    float ahead[2];
+    uint32_t psc = imp_add_camera(context, camera, node, world, ahead);
+    if (psc == IMP_SKIPPED)
+        return;
+    imp_motion_ride(context->motion, number, PSC_RIDER_CAMERA, psc, ahead);
+    if (camera->perspective)
+        imp_motion_use_camera(
+            context->motion, (struct imp_use){(uint32_t)node->camera, psc, number});
 }
 
 /* Cameras wait for the bounds of everything. */
@@ -205,16 +270,18 @@ static bool visit(struct walk *walk, uint32_t number, const double world[12], bo
     struct imp_context *context = walk->context;
     const struct gltf_model *model = context->model;
     const struct gltf_node *node = &model->nodes[number];
-    if (node->skin >= 0)
-        imp_warn(context, "Skins are ignored: meshes are drawn at rest.");
-    if (!hidden && node->mesh >= 0 && (uint32_t)node->mesh < model->mesh_count &&
-        !(node->instanced ? add_instances(context, node, number, world, error)
-                          : add_mesh_at(context, node, number, world, error)))
+    bool instanced = node->instanced && node->skin < 0;
+    bool shown = !hidden || context->motion->unveils[number];
+    if (node->instanced && node->skin >= 0)
+        imp_warn(context, "Skinned meshes are drawn once, not instanced.");
+    if (shown && node->mesh >= 0 && (uint32_t)node->mesh < model->mesh_count &&
+        !(instanced ? add_instances(context, number, world, hidden, error)
+                    : add_mesh_at(context, number, world, NULL, hidden, error)))
         return false;
-    if (!hidden && node->light >= 0 && (uint32_t)node->light < model->light_count)
-        imp_add_light(context, &model->lights[node->light], node, world);
+    if (shown && node->light >= 0 && (uint32_t)node->light < model->light_count)
+        add_light(context, &model->lights[node->light], node->light, number, world, hidden);
     if (!hidden && node->area_light >= 0 && (uint32_t)node->area_light < model->area_light_count)
-        imp_add_light(context, &model->area_lights[node->area_light], node, world);
+        add_light(context, &model->area_lights[node->area_light], -1, number, world, false);
     if (node->camera >= 0 && (uint32_t)node->camera < model->camera_count &&
         walk->camera_count <= IMP_MAX_LIGHTS) { /* the one too many draws the warning */
         struct waiting *camera = &walk->cameras[walk->camera_count++];
@@ -238,7 +305,7 @@ static bool walk_tree(
     stack[0].node = root;
     stack[0].next_child = 0;
     stack[0].hidden = model->nodes[root].hidden;
-    local_matrix(&model->nodes[root], stack[0].world);
+    imp_local_matrix(&model->nodes[root], stack[0].world);
     if (!visit(walk, root, stack[0].world, stack[0].hidden, error))
         return false;
     while (depth) {
@@ -256,7 +323,7 @@ static bool walk_tree(
         next->node = child;
         next->next_child = 0;
         next->hidden = top->hidden || model->nodes[child].hidden;
-        local_matrix(&model->nodes[child], local);
+        imp_local_matrix(&model->nodes[child], local);
         psc_affine_multiply(top->world, local, next->world);
         if (!visit(walk, child, next->world, next->hidden, error))
             return false;
@@ -266,20 +333,21 @@ static bool walk_tree(
 
 bool imp_add_nodes(struct imp_context *context, struct pen_error *error)
 {
-    const struct gltf_model *model = context->model;
     struct roots roots = {0};
-    if (!check_forest(context, &roots, error))
+    if (!check_forest(context, &roots, error) ||
+        !imp_motion_open(context, roots.nodes, roots.count, error)) {
+        free(roots.nodes);
         return false;
+    }
     struct walk walk = {
         .context = context, .cameras = pen_alloc_zero(IMP_MAX_LIGHTS + 1, sizeof *walk.cameras)};
     struct frame *stack = pen_alloc_zero(IMP_MAX_NODE_DEPTH, sizeof *stack);
     bool done = true;
     for (uint32_t i = 0; done && i < roots.count; i++)
         done = walk_tree(&walk, stack, roots.nodes[i], error);
-    for (uint32_t i = 0; done && i < walk.camera_count; i++) {
-        const struct gltf_node *node = &model->nodes[walk.cameras[i].node];
-        imp_add_camera(context, &model->cameras[node->camera], node, walk.cameras[i].world);
-    }
+    for (uint32_t i = 0; done && i < walk.camera_count; i++)
+        add_camera(context, walk.cameras[i].node, walk.cameras[i].world);
+    done = done && imp_motion_close(context, error);
     free(roots.nodes);
     free(stack);
     free(walk.cameras);

@@ -216,17 +216,16 @@ static bool open_images(struct imp_document *document, struct imp_files *files, 
     return true;
 }
 
-/* Leaves document->root with what the buffers and images point into, and the rest as text. */
+/* Leaves document->root with what the buffers and images point into and what moves, and the rest as
+ * text. */
 static void render_rest(struct imp_document *document)
 {
     cJSON *kept = cJSON_CreateObject();
     const char *const resolved[] = {"buffers", "images", "animations", "skins"};
     for (size_t i = 0; i < sizeof resolved / sizeof *resolved; i++) {
         cJSON *item = cJSON_DetachItemFromObjectCaseSensitive(document->root, resolved[i]);
-        if (item && i < 2)
+        if (item)
             cJSON_AddItemToObject(kept, resolved[i], item);
-        else
-            cJSON_Delete(item);
     }
     /* The views are read; tinygltf only has to find that they exist, and is strict about them. */
     cJSON *item;
@@ -254,9 +253,6 @@ bool imp_document_open(struct imp_document *document, const uint8_t *data, size_
         !open_buffers(document, bin, files, name, error) || !open_views(document, builder, error) ||
         !imp_document_unpack_draco(document, error) || !open_images(document, files, name, error))
         goto fail;
-    document->animation_count = (uint32_t)cJSON_GetArraySize(
-        cJSON_GetObjectItemCaseSensitive(document->root, "animations"));
-    document->has_skins = cJSON_GetObjectItemCaseSensitive(document->root, "skins") != NULL;
     render_rest(document);
     return true;
 fail:

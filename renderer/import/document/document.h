@@ -24,8 +24,6 @@ struct imp_document {
     struct imp_view *views;
     struct imp_image *images;
     uint32_t buffer_count, view_count, image_count;
-    uint32_t animation_count;
-    bool has_skins;
     char *text; /* for tinygltf: without buffers, images, animations, skins */
     size_t text_bytes;
     uint8_t **owned; /* unpacked memory */

@@ -17,12 +17,22 @@ struct Owner {
     std::vector<gltf_mesh> meshes;
     std::vector<gltf_node> nodes;
     std::vector<int32_t> children, roots;
+    std::vector<gltf_target> targets;
+    std::vector<float> weights;
     std::vector<gltf_material> materials;
     std::vector<gltf_texture> textures;
     std::vector<gltf_sampler> samplers;
     std::vector<gltf_camera> cameras;
     std::vector<gltf_light> lights, area_lights;
     std::deque<std::string> names; /* a deque never moves what it holds */
+
+    void keep(const std::vector<double> &from, uint32_t &first, uint32_t &count)
+    {
+        first = static_cast<uint32_t>(weights.size());
+        count = static_cast<uint32_t>(from.size());
+        for (double weight : from)
+            weights.push_back(static_cast<float>(weight));
+    }
 
     const char *keep(const std::string &name)
     {
@@ -122,9 +132,10 @@ gltf_accessor convert(const tinygltf::Accessor &from)
     to.component = static_cast<uint32_t>(from.componentType);
     bool matrix = from.type == TINYGLTF_TYPE_MAT2 || from.type == TINYGLTF_TYPE_MAT3 ||
                   from.type == TINYGLTF_TYPE_MAT4;
-    int components =
-        matrix ? 0 : tinygltf::GetNumComponentsInType(static_cast<uint32_t>(from.type));
-    to.components = components > 0 && components <= 4 ? static_cast<uint32_t>(components) : 0;
+    int components = from.type == TINYGLTF_TYPE_MAT4 ? 16
+                     : matrix                        ? 0
+                              : tinygltf::GetNumComponentsInType(static_cast<uint32_t>(from.type));
+    to.components = components > 0 ? static_cast<uint32_t>(components) : 0;
     to.normalized = from.normalized;
     to.offset = from.byteOffset;
     to.count = from.count;
@@ -146,7 +157,7 @@ int32_t attribute(const std::map<std::string, int> &attributes, const char *name
     return it == attributes.end() ? -1 : it->second;
 }
 
-gltf_primitive convert(const tinygltf::Primitive &from)
+gltf_primitive convert(const tinygltf::Primitive &from, Owner &owner)
 {
     gltf_primitive to = {};
     to.mode = static_cast<uint32_t>(from.mode);
@@ -158,7 +169,15 @@ gltf_primitive convert(const tinygltf::Primitive &from)
     to.uv[0] = attribute(from.attributes, "TEXCOORD_0");
     to.uv[1] = attribute(from.attributes, "TEXCOORD_1");
     to.color = attribute(from.attributes, "COLOR_0");
-    to.morphed = !from.targets.empty();
+    to.joints[0] = attribute(from.attributes, "JOINTS_0");
+    to.joints[1] = attribute(from.attributes, "JOINTS_1");
+    to.weights[0] = attribute(from.attributes, "WEIGHTS_0");
+    to.weights[1] = attribute(from.attributes, "WEIGHTS_1");
+    to.first_target = static_cast<uint32_t>(owner.targets.size());
+    to.target_count = static_cast<uint32_t>(from.targets.size());
+    for (const auto &target : from.targets)
+        owner.targets.push_back({attribute(target, "POSITION"), attribute(target, "NORMAL"),
+            attribute(target, "TANGENT")});
     return to;
 }
 
@@ -194,6 +213,7 @@ gltf_node convert(const tinygltf::Node &from, Owner &owner)
     to.first_child = static_cast<uint32_t>(owner.children.size());
     to.child_count = static_cast<uint32_t>(from.children.size());
     owner.children.insert(owner.children.end(), from.children.begin(), from.children.end());
+    owner.keep(from.weights, to.first_weight, to.weight_count);
     bool named = to.camera >= 0 || to.light >= 0 || to.area_light >= 0;
     to.name = named ? owner.keep(from.name) : "";
     return to;
@@ -345,10 +365,12 @@ void convert(const tinygltf::Model &model, Owner &owner, gltf_model &view)
     for (const auto &accessor : model.accessors)
         owner.accessors.push_back(convert(accessor));
     for (const auto &mesh : model.meshes) {
-        owner.meshes.push_back({static_cast<uint32_t>(owner.primitives.size()),
-            static_cast<uint32_t>(mesh.primitives.size())});
+        gltf_mesh to = {static_cast<uint32_t>(owner.primitives.size()),
+            static_cast<uint32_t>(mesh.primitives.size()), 0, 0};
+        owner.keep(mesh.weights, to.first_weight, to.weight_count);
+        owner.meshes.push_back(to);
         for (const auto &primitive : mesh.primitives)
-            owner.primitives.push_back(convert(primitive));
+            owner.primitives.push_back(convert(primitive, owner));
     }
     owner.nodes.reserve(model.nodes.size());
     for (const auto &node : model.nodes)
@@ -390,6 +412,8 @@ void show(const Owner &owner, gltf_model &view)
     SHOW(view, owner, area_lights, area_light_count);
     SHOW(view, owner, roots, root_count);
     view.children = owner.children.data();
+    view.targets = owner.targets.data();
+    view.weights = owner.weights.data();
 }
 
 /* The document that tinygltf sees has no URI left; whoever still asks for a file gets none. */

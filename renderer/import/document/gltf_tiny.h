@@ -15,7 +15,7 @@ extern "C" {
 struct gltf_accessor {
     int32_t view;        /* -1: zeros */
     uint32_t component;  /* GL's number: 5120 to 5126 */
-    uint32_t components; /* 1 to 4; 0: a matrix */
+    uint32_t components; /* 1 to 4; MAT4 16; 0: another matrix */
     bool normalized, sparse;
     uint64_t offset, count;
     uint64_t sparse_count, sparse_index_offset, sparse_value_offset;
@@ -27,11 +27,17 @@ struct gltf_primitive {
     uint32_t mode; /* 0 points to 6 triangle fan */
     int32_t indices, material;
     int32_t position, normal, tangent, uv[2], color; /* accessors; -1: none */
-    bool morphed;
+    int32_t joints[2], weights[2];
+    uint32_t first_target, target_count;
+};
+
+struct gltf_target {
+    int32_t position, normal, tangent; /* accessors; -1: none */
 };
 
 struct gltf_mesh {
     uint32_t first_primitive, primitive_count;
+    uint32_t first_weight, weight_count; /* of morph targets; 0: not told */
 };
 
 struct gltf_node {
@@ -44,6 +50,7 @@ struct gltf_node {
     bool instanced;                                                  /* EXT_mesh_gpu_instancing */
     bool hidden;                                                     /* KHR_node_visibility */
     uint32_t first_child, child_count;
+    uint32_t first_weight, weight_count; /* 0: the mesh's */
     const char *name;
 };
 
@@ -102,6 +109,8 @@ struct gltf_model {
     const struct gltf_mesh *meshes;
     const struct gltf_node *nodes;
     const int32_t *children;
+    const struct gltf_target *targets;
+    const float *weights;
     const struct gltf_material *materials;
     const struct gltf_texture *textures;
     const struct gltf_sampler *samplers;

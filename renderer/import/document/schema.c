@@ -48,7 +48,8 @@ static bool check_number(struct walk *walk, const cJSON *value, const struct fie
     bool integer = field->kind != NUMBER && field->kind != NUMBERS;
     if (integer && (x != floor(x) || x < 0 || x > INT32_MAX))
         return bad(walk, "must be an integer from 0 to 2^31 - 1");
-    bool index = field->kind == INDEX || field->kind == INDICES || field->kind == INDEX_MAP;
+    bool index = field->kind == INDEX || field->kind == INDICES || field->kind == INDEX_MAP ||
+                 field->kind == INDEX_MAPS;
     if (index && x >= walk->counts[field->into])
         return bad(walk, "refers to an item that does not exist");
     if (field->kind == UINT && (x < field->min || (field->max && x > field->max)))
@@ -56,8 +57,13 @@ static bool check_number(struct walk *walk, const cJSON *value, const struct fie
     return true;
 }
 
-static bool check_member(struct walk *walk, cJSON *item, const struct field *field)
+static bool check_members(struct walk *walk, cJSON *value, const struct field *field, bool named);
+
+static bool check_member(struct walk *walk, cJSON *item, const struct field *field, bool named)
 {
+    if (field->kind == INDEX_MAPS && !named)
+        return cJSON_IsObject(item) ? check_members(walk, item, field, true)
+                                    : bad(walk, "must be an object");
     if (field->kind == OBJECTS)
         return check_object(walk, item, field->schema);
     if (field->kind == STRINGS)
@@ -66,18 +72,18 @@ static bool check_member(struct walk *walk, cJSON *item, const struct field *fie
 }
 
 /* Every member of an array or object. */
-static bool check_members(struct walk *walk, cJSON *value, const struct field *field)
+static bool check_members(struct walk *walk, cJSON *value, const struct field *field, bool named)
 {
     uint32_t count = 0;
     for (cJSON *item = value->child; item; item = item->next, count++) {
-        struct step step = {walk->at, value->type == cJSON_Object ? item->string : NULL, count};
+        struct step step = {walk->at, named ? item->string : NULL, count};
         walk->at = &step;
-        bool fine = check_member(walk, item, field);
+        bool fine = check_member(walk, item, field, named);
         walk->at = step.up;
         if (!fine)
             return false;
     }
-    if (field->kind == NUMBERS && count != field->max)
+    if (field->kind == NUMBERS && field->max && count != field->max)
         return bad(walk, "has the wrong number of components");
     return true;
 }
@@ -93,14 +99,15 @@ static bool check_value(struct walk *walk, cJSON *value, const struct field *fie
     case INDICES:
     case OBJECTS:
     case STRINGS:
+    case INDEX_MAPS:
         if (!cJSON_IsArray(value))
             return bad(walk, "must be an array");
-        return check_members(walk, value, field);
+        return check_members(walk, value, field, false);
     case INDEX_MAP:
     case UINT_MAP:
         if (!cJSON_IsObject(value))
             return bad(walk, "must be an object");
-        return check_members(walk, value, field);
+        return check_members(walk, value, field, true);
     case ANYTHING:
         return true;
     case OBJECT:

@@ -76,9 +76,11 @@ SCHEMA(primitive,
     {"indices", INDEX, .into = IN_ACCESSORS},
     {"material", INDEX, .into = IN_MATERIALS},
     {"mode", UINT, .max = 6},
-    {"targets", ANYTHING},
+    {"targets", INDEX_MAPS, .into = IN_ACCESSORS},
     OBJ("extensions", primitive_extensions));
-SCHEMA(mesh, {"primitives", OBJECTS, .required = true, .schema = &primitive});
+SCHEMA(mesh,
+    {"primitives", OBJECTS, .required = true, .schema = &primitive},
+    {"weights", NUMBERS});
 
 SCHEMA(light_use, {"light", INDEX, .required = true, .into = IN_LIGHTS});
 SCHEMA(area_light_use, {"light", INDEX, .required = true, .into = IN_AREA_LIGHTS});
@@ -99,6 +101,7 @@ SCHEMA(node,
     {"translation", NUMBERS, .max = 3},
     {"rotation", NUMBERS, .max = 4},
     {"scale", NUMBERS, .max = 3},
+    {"weights", NUMBERS},
     OBJ("extensions", node_extensions));
 
 SCHEMA(texture_transform,
@@ -198,7 +201,27 @@ SCHEMA(area_light,
     OBJ("rect", area_rect));
 SCHEMA(area_lights, ARRAY("lights", area_light));
 SCHEMA(root_extensions, OBJ("KHR_lights_punctual", lights), OBJ("EXT_lights_area", area_lights));
-SCHEMA(nothing, {"name", STRING});
+
+SCHEMA(skin,
+    {"inverseBindMatrices", INDEX, .into = IN_ACCESSORS},
+    {"joints", INDICES, .required = true, .into = IN_NODES});
+SCHEMA(animation_pointer, {"pointer", STRING, .required = true});
+SCHEMA(channel_target_extensions, OBJ("KHR_animation_pointer", animation_pointer));
+SCHEMA(channel_target,
+    {"node", INDEX, .into = IN_NODES},
+    {"path", STRING, .required = true},
+    OBJ("extensions", channel_target_extensions));
+SCHEMA(channel,
+    {"sampler", UINT, .required = true},
+    {"target", OBJECT, .required = true, .schema = &channel_target});
+SCHEMA(animation_sampler,
+    {"input", INDEX, .required = true, .into = IN_ACCESSORS},
+    {"output", INDEX, .required = true, .into = IN_ACCESSORS},
+    {"interpolation", STRING});
+SCHEMA(animation,
+    {"name", STRING},
+    {"channels", OBJECTS, .required = true, .schema = &channel},
+    {"samplers", OBJECTS, .required = true, .schema = &animation_sampler});
 
 static const struct field root_fields[] = {
     {"asset", OBJECT, .required = true, .schema = &asset},
@@ -216,8 +239,8 @@ static const struct field root_fields[] = {
     ARRAY("images", image),
     ARRAY("samplers", sampler),
     ARRAY("cameras", camera),
-    ARRAY("skins", nothing),
-    ARRAY("animations", nothing),
+    ARRAY("skins", skin),
+    ARRAY("animations", animation),
     OBJ("extensions", root_extensions),
 };
 const struct schema schema_root = {root_fields, sizeof root_fields / sizeof *root_fields};

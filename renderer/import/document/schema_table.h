@@ -17,13 +17,14 @@ struct schema_array {
 };
 
 enum field_kind {
-    INDEX,     /* into array `into` */
-    UINT,      /* min to max; max 0: up to 2^31 - 1 */
-    NUMBER,    /* finite in single precision */
-    NUMBERS,   /* an array of `max` of them */
-    INDICES,   /* an array of INDEX */
-    INDEX_MAP, /* an object whose members are INDEX */
-    UINT_MAP,  /* an object whose members are UINT */
+    INDEX,      /* into array `into` */
+    UINT,       /* min to max; max 0: up to 2^31 - 1 */
+    NUMBER,     /* finite in single precision */
+    NUMBERS,    /* an array of `max` of them; max 0: of any number */
+    INDICES,    /* an array of INDEX */
+    INDEX_MAP,  /* an object whose members are INDEX */
+    INDEX_MAPS, /* an array of INDEX_MAP */
+    UINT_MAP,   /* an object whose members are UINT */
     STRING,
     STRINGS,
     BOOL,

@@ -12,5 +12,7 @@ void imp_geometry_finish(struct imp_geometry *g)
     free(g->colors);
     free(g->indices);
     free(g->meshlet_triangles);
+    free(g->used);
+    free(g->points);
     memset(g, 0, sizeof *g);
 }

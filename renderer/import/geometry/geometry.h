@@ -8,6 +8,10 @@ struct imp_geometry {
     float (*tangents)[4];
     float (*uv[2])[2];
     float (*colors)[4];
+    uint32_t *used;     /* number of each vertex in the file; such vertices are not welded */
+    uint32_t used_of;   /* how many the file's primitive has */
+    float (*points)[3]; /* that the positions are solids around; NULL: they are none */
+    uint32_t point_count;
     uint32_t vertex_count;
     uint32_t *indices;
     uint32_t index_count;

@@ -5,20 +5,21 @@
 
 #define MESHLET_VERTICES 128
 #define CONE_WEIGHT 0.5f
+#define STREAMS 7
 
 struct stream {
     void **data;
     size_t item_bytes;
 };
 
-static unsigned list_streams(struct imp_geometry *g, struct stream streams[6])
+static unsigned list_streams(struct imp_geometry *g, struct stream streams[STREAMS])
 {
     const struct stream all[] = {{(void **)&g->positions, sizeof *g->positions},
         {(void **)&g->normals, sizeof *g->normals}, {(void **)&g->tangents, sizeof *g->tangents},
         {(void **)&g->uv[0], sizeof *g->uv[0]}, {(void **)&g->uv[1], sizeof *g->uv[1]},
-        {(void **)&g->colors, sizeof *g->colors}};
+        {(void **)&g->colors, sizeof *g->colors}, {(void **)&g->used, sizeof *g->used}};
     unsigned count = 0;
-    for (unsigned i = 0; i < 6; i++)
+    for (unsigned i = 0; i < STREAMS; i++)
         if (*all[i].data)
             streams[count++] = all[i];
     return count;
@@ -26,7 +27,7 @@ static unsigned list_streams(struct imp_geometry *g, struct stream streams[6])
 
 static void apply_remap(struct imp_geometry *g, const unsigned *remap, size_t new_count)
 {
-    struct stream streams[6];
+    struct stream streams[STREAMS];
     unsigned count = list_streams(g, streams);
     for (unsigned i = 0; i < count; i++) {
         void *moved = pen_alloc_zero(new_count, streams[i].item_bytes);
@@ -41,8 +42,8 @@ static void apply_remap(struct imp_geometry *g, const unsigned *remap, size_t ne
 
 static void weld(struct imp_geometry *g, unsigned *remap)
 {
-    struct stream streams[6];
-    struct meshopt_Stream views[6];
+    struct stream streams[STREAMS];
+    struct meshopt_Stream views[STREAMS];
     unsigned count = list_streams(g, streams);
     for (unsigned i = 0; i < count; i++)
         views[i] =

@@ -1,0 +1,373 @@
+#include "renderer/pose/pose.h"
+#include "protocol/memory.h"
+#include "renderer/blob/bounds.h"
+#include "renderer/pose/internal.h"
+#include "renderer/pose/place.h"
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define BOUND_BUDGET (64u << 20) /* vertices transformed for tight world bounds */
+#define FARTHEST 1e12            /* of a matrix element */
+
+static void *copy(const void *from, size_t count, size_t item_bytes)
+{
+    void *to = pen_alloc_zero(count, item_bytes);
+    if (from)
+        memcpy(to, from, count * item_bytes);
+    return to;
+}
+
+static uint32_t most_joints(const struct psc_motion *m)
+{
+    uint32_t most = 0;
+    for (uint32_t i = 0; i < m->skin_count; i++)
+        most = m->skins[i].joint_count > most ? m->skins[i].joint_count : most;
+    return most;
+}
+
+static uint32_t most_components(const struct psc_motion *m)
+{
+    uint32_t most = 4;
+    for (uint32_t i = 0; i < m->sampler_count; i++)
+        most = m->samplers[i].components > most ? m->samplers[i].components : most;
+    return most;
+}
+
+static void create_deforms(struct pose *pose)
+{
+    const struct psc_motion *m = &pose->rest->motion;
+    pose->deforms = copy(NULL, m->deform_count, sizeof *pose->deforms);
+    pose->moved = copy(NULL, m->deform_count, sizeof *pose->moved);
+    for (uint32_t i = 0; i < m->deform_count; i++) {
+        const struct psc_deform *d = &m->deforms[i];
+        uint32_t joints = d->skin >= 0 ? m->skins[d->skin].joint_count : 0;
+        pose->deforms[i].joints = copy(NULL, joints, sizeof *pose->deforms[i].joints);
+        pose->deforms[i].weights = copy(NULL, d->target_count, sizeof *pose->deforms[i].weights);
+    }
+}
+
+/* What channels write goes back to what the file says. */
+static void reset(struct pose *pose)
+{
+    const struct psc_scene *rest = pose->rest;
+    const struct psc_motion *m = &rest->motion;
+    memcpy(pose->nodes, m->nodes, m->node_count * sizeof *pose->nodes);
+    memcpy(pose->weights, m->weights, m->weight_count * sizeof *pose->weights);
+    memcpy(pose->material_rests, m->material_rests,
+        m->material_rest_count * sizeof *pose->material_rests);
+    memcpy(pose->light_rests, m->light_rests, m->light_rest_count * sizeof *pose->light_rests);
+    memcpy(pose->materials, rest->materials, rest->material_count * sizeof *pose->materials);
+    memcpy(pose->lights, rest->lights, rest->light_count * sizeof *pose->lights);
+    memcpy(pose->cameras, rest->cameras, rest->camera_count * sizeof *pose->cameras);
+}
+
+struct pose *pose_create(const struct psc_scene *rest)
+{
+    const struct psc_motion *m = &rest->motion;
+    struct pose *pose = copy(NULL, 1, sizeof *pose);
+    pose->rest = rest;
+    pose->scene = *rest;
+    pose->header = *rest->header;
+    pose->nodes = copy(m->nodes, m->node_count, sizeof *pose->nodes);
+    pose->weights = copy(m->weights, m->weight_count, sizeof *pose->weights);
+    pose->material_rests =
+        copy(m->material_rests, m->material_rest_count, sizeof *pose->material_rests);
+    pose->light_rests = copy(m->light_rests, m->light_rest_count, sizeof *pose->light_rests);
+    pose->alphas = copy(NULL, m->material_rest_count, sizeof *pose->alphas);
+    pose->channel_values = copy(NULL, most_components(m), sizeof *pose->channel_values);
+    pose->worlds = copy(NULL, m->node_count, sizeof *pose->worlds);
+    pose->hidden = copy(NULL, m->node_count, sizeof *pose->hidden);
+    pose->joints = copy(NULL, most_joints(m), sizeof *pose->joints);
+    if (m->deform_count) { /* else no vertex moves */
+        pose->positions = copy(rest->positions, rest->vertex_count, sizeof *pose->positions);
+        pose->attributes = copy(rest->attributes, rest->vertex_count, sizeof *pose->attributes);
+        pose->meshlets = copy(rest->meshlets, rest->meshlet_count, sizeof *pose->meshlets);
+        pose->primitives = copy(rest->primitives, rest->primitive_count, sizeof *pose->primitives);
+        pose->scene.positions = (const float(*)[3])pose->positions;
+        pose->scene.attributes = pose->attributes;
+        pose->scene.meshlets = pose->meshlets;
+        pose->scene.primitives = pose->primitives;
+    }
+    pose->instances = copy(rest->instances, rest->instance_count, sizeof *pose->instances);
+    pose->materials = copy(rest->materials, rest->material_count, sizeof *pose->materials);
+    pose->lights = copy(rest->lights, rest->light_count, sizeof *pose->lights);
+    pose->cameras = copy(rest->cameras, rest->camera_count, sizeof *pose->cameras);
+    pose->instance_bounds = copy(NULL, rest->instance_count, sizeof *pose->instance_bounds);
+    pose->instance_dirty = copy(NULL, rest->instance_count, sizeof *pose->instance_dirty);
+    memset(pose->instance_dirty, 1, rest->instance_count * sizeof *pose->instance_dirty);
+    pose->scene.header = &pose->header;
+    pose->shown = copy(NULL, rest->instance_count, sizeof *pose->shown);
+    pose->scene.instances = pose->shown;
+    pose->scene.materials = pose->materials;
+    pose->scene.lights = pose->lights;
+    pose->scene.cameras = pose->cameras;
+    pose->scene.map_bytes = 0; /* the mapping is not ours */
+    create_deforms(pose);
+    return pose;
+}
+
+void pose_destroy(struct pose *pose)
+{
+    if (!pose)
+        return;
+    for (uint32_t i = 0; i < pose->rest->motion.deform_count; i++) {
+        free(pose->deforms[i].joints);
+        free(pose->deforms[i].weights);
+    }
+    void *const owned[] = {pose->nodes, pose->weights, pose->material_rests, pose->light_rests,
+        pose->alphas, pose->channel_values, pose->worlds, pose->hidden, pose->joints,
+        pose->positions, pose->attributes, pose->meshlets, pose->primitives, pose->instances,
+        pose->shown, pose->materials, pose->lights, pose->cameras, pose->instance_bounds,
+        pose->instance_dirty, pose->deforms, pose->moved};
+    for (size_t i = 0; i < sizeof owned / sizeof *owned; i++)
+        free(owned[i]);
+    free(pose);
+}
+
+bool pose_find(
+    const struct psc_scene *scene, const char *text, int32_t *animation, struct pen_error *error)
+{
+    const struct psc_motion *m = &scene->motion;
+    char *end, list[200] = "";
+    *animation = -1;
+    if (!*text)
+        return true;
+    for (uint32_t i = 0; i < m->animation_count; i++)
+        if (!strcmp(m->animations[i].name, text)) {
+            *animation = (int32_t)i;
+            return true;
+        }
+    unsigned long number = strtoul(text, &end, 10);
+    if (*text >= '0' && *text <= '9' && !*end && number < m->animation_count) {
+        *animation = (int32_t)number;
+        return true;
+    }
+    if (!m->animation_count)
+        return pen_fail(error, PEN_INVALID, "/animation", "The scene has no animations.");
+    for (size_t i = 0, at = 0; i < m->animation_count && at < sizeof list; i++) {
+        const char *name = m->animations[i].name;
+        at += (size_t)(*name ? snprintf(list + at, sizeof list - at, i ? ", %s" : "%s", name)
+                             : snprintf(list + at, sizeof list - at, i ? ", %zu" : "%zu", i));
+    }
+    return pen_fail(error, PEN_INVALID, "/animation",
+        "The scene has the animations %s; there is no \"%.60s\".", list, text);
+}
+
+float pose_clamp(const struct psc_scene *scene, int32_t animation, float time_s)
+{
+    if (animation < 0 || !(time_s > 0))
+        return 0;
+    return fminf(time_s, scene->motion.animations[animation].duration_s);
+}
+
+static bool find_worlds(struct pose *pose)
+{
+    for (uint32_t i = 0; i < pose->rest->motion.node_count; i++) {
+        const struct psc_node *node = &pose->nodes[i];
+        double local[12];
+        if (node->flags & PSC_NODE_MATRIX)
+            memcpy(local, node->matrix, sizeof local);
+        else {
+            psc_affine_trs((const float[3]){0, 0, 0}, node->rotation, node->scale, local);
+            for (int k = 0; k < 3; k++)
+                local[4 * k + 3] = node->translation[k];
+        }
+        pose->hidden[i] = (node->flags & PSC_NODE_HIDDEN) != 0;
+        if (node->parent >= 0) {
+            psc_affine_multiply(pose->worlds[node->parent], local, pose->worlds[i]);
+            pose->hidden[i] |= pose->hidden[node->parent];
+        } else
+            memcpy(pose->worlds[i], local, sizeof local);
+        for (int k = 0; k < 12; k++)
+            if (!(fabs(pose->worlds[i][k]) <= FARTHEST))
+                return false;
+    }
+    return true;
+}
+
+static double determinant(const float m[12])
+{
+    return (double)m[0] * ((double)m[5] * (double)m[10] - (double)m[6] * (double)m[9]) -
+           (double)m[1] * ((double)m[4] * (double)m[10] - (double)m[6] * (double)m[8]) +
+           (double)m[2] * ((double)m[4] * (double)m[9] - (double)m[5] * (double)m[8]);
+}
+
+/* From the file's world and the file's vertices to the blob's. */
+static void to_origin(const struct pose *pose, const struct psc_instance *instance, double m[12])
+{
+    const struct psc_primitive *p = &pose->rest->primitives[instance->primitive];
+    double offset[3], at[3];
+    for (int k = 0; k < 3; k++)
+        offset[k] = p->offset[k];
+    psc_affine_point(m, offset, at);
+    for (int k = 0; k < 3; k++)
+        m[4 * k + 3] = at[k] - pose->rest->header->origin[k];
+}
+
+static bool place_instance(struct pose *pose, const struct psc_rider *rider, uint32_t *changes)
+{
+    struct psc_instance *instance = &pose->instances[rider->item];
+    uint32_t hidden = pose->hidden[rider->node] ? PSC_HIDDEN : 0;
+    uint32_t flags = (instance->flags & (uint32_t)PSC_MIRRORED) | hidden;
+    if (!(rider->flags & PSC_RIDER_SKINNED)) {
+        double local[12], world[12];
+        float placed[12];
+        for (int k = 0; k < 12; k++)
+            local[k] = rider->local[k];
+        psc_affine_multiply(pose->worlds[rider->node], local, world);
+        to_origin(pose, instance, world);
+        for (int k = 0; k < 12; k++) {
+            if (!(fabs(world[k]) <= FARTHEST))
+                return false;
+            placed[k] = (float)world[k];
+        }
+        if (memcmp(placed, instance->world, sizeof placed)) {
+            memcpy(instance->world, placed, sizeof placed);
+            pose->instance_dirty[rider->item] = true;
+            *changes |= POSE_INSTANCES;
+        }
+        flags = hidden | (determinant(placed) < 0 ? PSC_MIRRORED : 0);
+    }
+    if (flags != instance->flags)
+        *changes |= POSE_STATE;
+    instance->flags = flags;
+    return true;
+}
+
+static bool place_riders(struct pose *pose, uint32_t *changes)
+{
+    const struct psc_motion *m = &pose->rest->motion;
+    for (uint32_t i = 0; i < m->rider_count; i++) {
+        const struct psc_rider *rider = &m->riders[i];
+        const double *world = pose->worlds[rider->node];
+        if (rider->kind == PSC_RIDER_INSTANCE) {
+            if (!place_instance(pose, rider, changes))
+                return false;
+        } else if (rider->kind == PSC_RIDER_LIGHT) {
+            struct pen_light *light = &pose->lights[rider->item].light;
+            if (!pose_place_light(light, world, rider->size))
+                return false;
+            if (pose->hidden[rider->node])
+                memset(light->color, 0, sizeof light->color);
+        } else if (!pose_place_camera(&pose->cameras[rider->item], world, rider->size))
+            return false;
+    }
+    return true;
+}
+
+static void find_bounds(struct pose *pose)
+{
+    struct psc_scene all = pose->scene;
+    struct psc_header *h = &pose->header;
+    uint64_t budget = BOUND_BUDGET;
+    all.instances = pose->instances;
+    psc_bounds_clear(h->bounds_min, h->bounds_max);
+    h->triangles = 0;
+    for (uint32_t i = 0; i < pose->rest->instance_count; i++) {
+        const struct psc_primitive *p = &all.primitives[all.instances[i].primitive];
+        float(*box)[3] = pose->instance_bounds[i];
+        if (!p->index_count || all.instances[i].flags & PSC_HIDDEN)
+            continue;
+        h->triangles += p->index_count / 3;
+        if (pose->instance_dirty[i]) {
+            bool tight = p->vertex_count <= budget;
+            budget -= tight ? p->vertex_count : 0;
+            psc_bounds_clear(box[0], box[1]);
+            psc_bounds_grow(&all, i, tight, box[0], box[1]);
+            pose->instance_dirty[i] = false;
+        }
+        for (int k = 0; k < 3; k++) {
+            h->bounds_min[k] = fminf(h->bounds_min[k], box[0][k]);
+            h->bounds_max[k] = fmaxf(h->bounds_max[k], box[1][k]);
+        }
+    }
+}
+
+static void show_instances(struct pose *pose)
+{
+    pose->scene.instance_count = 0;
+    for (uint32_t i = 0; i < pose->rest->instance_count; i++)
+        if (!(pose->instances[i].flags & PSC_HIDDEN))
+            pose->shown[pose->scene.instance_count++] = pose->instances[i];
+}
+
+static void mark_moved(struct pose *pose)
+{
+    const struct psc_scene *scene = &pose->scene;
+    if (!pose->moved_count)
+        return;
+    bool *moved = copy(NULL, scene->primitive_count, sizeof *moved);
+    for (uint32_t i = 0; i < pose->moved_count; i++)
+        moved[pose->moved[i]] = true;
+    for (uint32_t i = 0; i < pose->rest->instance_count; i++)
+        pose->instance_dirty[i] |= moved[pose->instances[i].primitive];
+    free(moved);
+}
+
+static bool is_finite_scene(const struct pose *pose)
+{
+    const struct psc_header *h = &pose->header;
+    for (int k = 0; k < 3; k++)
+        if (!isfinite(h->bounds_min[k]) || !isfinite(h->bounds_max[k]))
+            return false;
+    return true;
+}
+
+static void finish_materials(struct pose *pose, uint32_t *changes)
+{
+    for (uint32_t i = 0; i < pose->rest->motion.material_rest_count; i++) {
+        struct psc_material *m = &pose->materials[pose->material_rests[i].material];
+        float alpha[8] = {m->base_color[3], m->alpha_cutoff};
+        pose_finish_material(m, &pose->material_rests[i]);
+        memcpy(alpha + 2, m->base.transform, sizeof m->base.transform);
+        if (m->alpha_mode != PSC_OPAQUE && memcmp(alpha, pose->alphas[i], sizeof alpha))
+            *changes |= POSE_ALPHA;
+        memcpy(pose->alphas[i], alpha, sizeof alpha);
+        *changes |= POSE_MATERIALS;
+    }
+}
+
+bool pose_set(
+    struct pose *pose, int32_t animation, float time_s, uint32_t *changes, struct pen_error *error)
+{
+    const struct psc_motion *m = &pose->rest->motion;
+    const struct psc_animation *a = animation >= 0 ? &m->animations[animation] : NULL;
+    bool fits;
+    *changes = 0;
+    pose->moved_count = 0;
+    reset(pose);
+    if (a)
+        pose_apply_channels(pose, a, time_s);
+    finish_materials(pose, changes);
+    for (uint32_t i = 0; i < m->light_rest_count; i++)
+        pose_light_power(&pose->lights[pose->light_rests[i].light].light, &pose->light_rests[i]);
+    fits = find_worlds(pose) && place_riders(pose, changes);
+    for (uint32_t i = 0; fits && i < m->deform_count; i++)
+        fits = pose_deform(pose, i, changes);
+    *changes |= POSE_LIGHTS;
+    mark_moved(pose);
+    show_instances(pose);
+    if (fits)
+        find_bounds(pose);
+    if (!fits || !is_finite_scene(pose))
+        return pen_fail(error, PEN_INVALID, "/time_s",
+            "At this moment the animation moves something beyond 1e12 m.");
+    return true;
+}
+
+const struct psc_scene *pose_scene(const struct pose *pose)
+{
+    return &pose->scene;
+}
+
+const uint32_t *pose_moved(const struct pose *pose, uint32_t *count)
+{
+    *count = pose->moved_count;
+    return pose->moved;
+}
+
+const struct psc_instance *pose_instances(const struct pose *pose)
+{
+    return pose->instances;
+}

@@ -3,7 +3,7 @@
 #include <string.h>
 #include <time.h>
 
-static const char *const type_names[] = {"float", "int", "uint", "flag", "double"};
+static const char *const type_names[] = {"float", "int", "uint", "flag", "double", "text"};
 
 static void write_row(struct pen_json *json, const struct pen_param *row)
 {
@@ -17,7 +17,7 @@ static void write_row(struct pen_json *json, const struct pen_param *row)
         for (uint32_t i = 0; row->choices[i]; i++)
             pen_json_string(json, NULL, row->choices[i]);
         pen_json_end(json);
-    } else if (row->type != PEN_PARAM_FLAG) {
+    } else if (row->type != PEN_PARAM_FLAG && row->type != PEN_PARAM_TEXT) {
         pen_json_double(json, "min", row->min);
         pen_json_double(json, "max", row->max);
         if (row->exclusive_min)
@@ -111,8 +111,8 @@ void pen_scene_write(struct pen_json *json, const char *key, const struct pen_sc
     } counts[] = {{"triangles", scene->triangles}, {"vertices", scene->vertices},
         {"primitives", scene->primitives}, {"instances", scene->instances},
         {"materials", scene->materials}, {"textures", scene->textures}, {"images", scene->images},
-        {"animations", scene->animations}, {"source_bytes", scene->source_bytes},
-        {"stored_bytes", scene->blob_bytes}, {"gpu_bytes", scene->gpu_bytes}};
+        {"source_bytes", scene->source_bytes}, {"stored_bytes", scene->blob_bytes},
+        {"gpu_bytes", scene->gpu_bytes}};
     pen_json_object(json, key);
     pen_json_id(json, "id", scene->id);
     for (uint32_t i = 0; i < sizeof counts / sizeof *counts; i++)
@@ -138,6 +138,15 @@ void pen_scene_write(struct pen_json *json, const char *key, const struct pen_sc
         pen_json_object(json, NULL);
         pen_json_string(json, "name", scene->lights[i].name);
         pen_light_write(json, "light", &scene->lights[i].light);
+        pen_json_end(json);
+    }
+    pen_json_end(json);
+    pen_json_array(json, "animations");
+    for (uint32_t i = 0; i < scene->animation_count; i++) {
+        pen_json_object(json, NULL);
+        pen_json_uint(json, "index", i);
+        pen_json_string(json, "name", scene->animations[i].name);
+        pen_json_float(json, "duration_s", scene->animations[i].duration_s);
         pen_json_end(json);
     }
     pen_json_end(json);

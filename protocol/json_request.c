@@ -2,6 +2,7 @@
 #include "protocol/json_request.h"
 #include "protocol/json_scan.h"
 #include "protocol/json_suggest.h"
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -103,12 +104,31 @@ static bool read_vector(
     return true;
 }
 
+/* A number stands for its digits: names may be all digits, and flags and queries are text. */
+static bool read_text(
+    struct reader *reader, const struct pen_param *row, const cJSON *node, void *base)
+{
+    char digits[16];
+    const char *text = node->valuestring;
+    if (cJSON_IsNumber(node)) {
+        double x = node->valuedouble;
+        if (!(x >= 0 && x <= UINT32_MAX && x == floor(x)))
+            return REFUSE(reader, "%s must be a name, or a number from 0.", row->name);
+        snprintf(digits, sizeof digits, "%.0f", x);
+        text = digits;
+    } else if (!cJSON_IsString(node))
+        return REFUSE(reader, "%s must be a name, or a number from 0.", row->name);
+    return pen_param_store_text(row, base, text, reader->pointer, reader->error);
+}
+
 static bool read_row(
     struct reader *reader, const struct pen_param *row, const cJSON *node, void *base)
 {
     double values[4] = {0};
     if (cJSON_IsString(node) && pen_param_store_word(row, base, node->valuestring))
         return true;
+    if (row->type == PEN_PARAM_TEXT)
+        return read_text(reader, row, node, base);
     if (row->choices) {
         if (!cJSON_IsString(node))
             return REFUSE(reader, "%s must be a string.", row->name);

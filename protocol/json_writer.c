@@ -237,6 +237,10 @@ void pen_json_row(struct pen_json *json, const struct pen_param *row, const void
         pen_json_string(json, row->name, row->word);
         return;
     }
+    if (row->type == PEN_PARAM_TEXT) {
+        pen_json_string(json, row->name, pen_param_load_text(row, object));
+        return;
+    }
     for (uint32_t i = 0; i < row->count; i++)
         values[i] = pen_param_load(row, object, i);
     write_components(json, row->name, row, values);
@@ -244,7 +248,9 @@ void pen_json_row(struct pen_json *json, const struct pen_param *row, const void
 
 void pen_json_row_default(struct pen_json *json, const char *key, const struct pen_param *row)
 {
-    if (!row->automatic)
+    if (row->type == PEN_PARAM_TEXT)
+        pen_json_string(json, key, "");
+    else if (!row->automatic)
         write_components(json, key, row, row->def_v);
 }
 

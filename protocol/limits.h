@@ -4,6 +4,7 @@
 #define PEN_MAX_LIGHTS 8
 #define PEN_TECHNIQUE_PARAM_BYTES 256
 #define PEN_TECHNIQUE_NAME_BYTES 32
+#define PEN_NAME_BYTES 60                /* of what a scene names, with the zero at its end */
 #define PEN_MAX_IMAGE_SIDE 8192          /* px */
 #define PEN_MAX_IMAGE_PIXELS (16u << 20) /* px per image, before antialiasing */
 #define PEN_MAX_ANTIALIAS 64             /* jittered frames */

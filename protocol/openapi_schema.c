@@ -45,7 +45,10 @@ static void write_component(struct pen_json *json, const struct pen_param *row)
         write_strings(json, "enum", row->choices);
     } else if (row->type == PEN_PARAM_FLAG)
         pen_json_string(json, "type", "boolean");
-    else {
+    else if (row->type == PEN_PARAM_TEXT) {
+        static const char *const types[] = {"string", "integer", NULL};
+        write_strings(json, "type", types);
+    } else {
         pen_json_string(json, "type", pen_param_is_real(row) ? "number" : "integer");
         pen_json_double(json, row->exclusive_min ? "exclusiveMinimum" : "minimum", row->min);
         pen_json_double(json, "maximum", row->max);

@@ -70,8 +70,11 @@ void pen_params_default(struct pen_param_table table, void *object)
 {
     for (uint32_t r = 0; r < table.count; r++)
         for (uint32_t i = 0; i < table.rows[r].count; i++)
-            store(&table.rows[r], object, i,
-                table.rows[r].automatic ? PEN_AUTO : table.rows[r].def_v[i]);
+            if (table.rows[r].type == PEN_PARAM_TEXT)
+                memset((char *)object + table.rows[r].offset, 0, table.rows[r].bytes);
+            else
+                store(&table.rows[r], object, i,
+                    table.rows[r].automatic ? PEN_AUTO : table.rows[r].def_v[i]);
 }
 
 bool pen_param_is_auto(const struct pen_param *row, const void *object)
@@ -132,12 +135,38 @@ bool pen_param_store(const struct pen_param *row, void *object, const double *va
     return true;
 }
 
+bool pen_param_store_text(const struct pen_param *row, void *object, const char *text,
+    const char *pointer, struct pen_error *error)
+{
+    char *to = (char *)object + row->offset;
+    size_t length = strlen(text);
+    if (length > row->bytes - 1u) {
+        length = row->bytes - 1u;
+        while (length && ((unsigned char)text[length] & 0xc0) == 0x80)
+            length--;
+    }
+    for (size_t i = 0; i < length; i++)
+        if ((unsigned char)text[i] < 0x20 || text[i] == 0x7f)
+            return pen_fail(
+                error, PEN_INVALID, pointer, "%s holds a control character.", row->name);
+    memset(to, 0, row->bytes);
+    memcpy(to, text, length);
+    return true;
+}
+
+const char *pen_param_load_text(const struct pen_param *row, const void *object)
+{
+    return (const char *)object + row->offset;
+}
+
 bool pen_param_parse(const struct pen_param *row, void *object, const char *text,
     const char *pointer, struct pen_error *error)
 {
     double values[4] = {0};
     if (pen_param_store_word(row, object, text))
         return true;
+    if (row->type == PEN_PARAM_TEXT)
+        return pen_param_store_text(row, object, text, pointer, error);
     if (row->choices) {
         int index = pen_choice_index(row->choices, text);
         if (index < 0)

@@ -17,6 +17,7 @@ enum pen_param_type {
     PEN_PARAM_UINT,   /* uint32_t; with .choices an enumeration whose value is the index */
     PEN_PARAM_FLAG,   /* pen_flag */
     PEN_PARAM_DOUBLE, /* double or double[n]: points of the world */
+    PEN_PARAM_TEXT,   /* char[n], padded with zeros, the last one always zero; default "" */
 };
 
 struct pen_param {
@@ -33,6 +34,7 @@ struct pen_param {
     uint16_t offset;    /* bytes from the start of the struct */
     uint8_t type;       /* enum pen_param_type */
     uint8_t count;      /* components, 1 to 4 */
+    uint8_t bytes;      /* of the field */
     uint8_t specialise; /* 1: a constant of the shader, one program per value: for what chooses its
                            code, not for counts and sizes */
     uint8_t exclusive_min; /* 1: min itself is not allowed */
@@ -50,23 +52,26 @@ struct pen_param {
 #define PEN_PARAM_TYPE_OF(field)                                                                   \
     _Generic((field), float : PEN_PARAM_FLOAT, float * : PEN_PARAM_FLOAT, int32_t : PEN_PARAM_INT, \
              uint32_t : PEN_PARAM_UINT, pen_flag : PEN_PARAM_FLAG, double : PEN_PARAM_DOUBLE,           \
-             double * : PEN_PARAM_DOUBLE)
+             double * : PEN_PARAM_DOUBLE, char * : PEN_PARAM_TEXT)
 #define PEN_PARAM_COUNT_OF(field)                                                                  \
-    (sizeof(field) / _Generic((field), double : 8, double * : 8, default : 4))
+    _Generic((field), char * : 1, double : 1, double * : sizeof(field) / 8,                        \
+        default : sizeof(field) / 4)
 
 /* PARAM(struct pcss, search_taps, .def = 16, .min = 1, .max = 64, .help = "...") */
 #define PARAM(aggregate, field, ...)                                                               \
     {                                                                                              \
         .name = #field, .offset = offsetof(aggregate, field),                                      \
         .type = PEN_PARAM_TYPE_OF(((aggregate *)0)->field),                                        \
-        .count = PEN_PARAM_COUNT_OF(((aggregate *)0)->field), __VA_ARGS__                          \
+        .count = PEN_PARAM_COUNT_OF(((aggregate *)0)->field),                                      \
+        .bytes = sizeof(((aggregate *)0)->field), __VA_ARGS__                                      \
     }
 /* The same with a JSON key that differs from the C field. */
 #define PARAM_AS(aggregate, field, key, ...)                                                       \
     {                                                                                              \
         .name = key, .offset = offsetof(aggregate, field),                                         \
         .type = PEN_PARAM_TYPE_OF(((aggregate *)0)->field),                                        \
-        .count = PEN_PARAM_COUNT_OF(((aggregate *)0)->field), __VA_ARGS__                          \
+        .count = PEN_PARAM_COUNT_OF(((aggregate *)0)->field),                                      \
+        .bytes = sizeof(((aggregate *)0)->field), __VA_ARGS__                                      \
     }
 
 struct pen_param_table {
@@ -99,7 +104,13 @@ const struct pen_param *pen_param_find(struct pen_param_table table, const char 
 bool pen_param_store(const struct pen_param *row, void *object, const double *values,
     const char *pointer, struct pen_error *error);
 
-/* Component i of the row's value in `object`. */
+/* The same for a text. One that is too long is cut where a character of UTF-8 ends; control
+ * characters are refused. */
+bool pen_param_store_text(const struct pen_param *row, void *object, const char *text,
+    const char *pointer, struct pen_error *error);
+const char *pen_param_load_text(const struct pen_param *row, const void *object);
+
+/* Component i of the row's value, which is no text, in `object`. */
 double pen_param_load(const struct pen_param *row, const void *object, uint32_t i);
 
 /* As pen_param_store, from text ("32", "on", "quadtree", "1,2.5,0"): query strings and flags. */

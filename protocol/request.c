@@ -179,6 +179,11 @@ static bool check_rows(struct pen_param_table table, const void *object, uint32_
         if ((row->applies && light_bit && !(row->applies & light_bit)) ||
             pen_param_is_auto(row, object) || pen_param_is_word(row, object))
             continue;
+        if (row->type == PEN_PARAM_TEXT) {
+            if (memchr(pen_param_load_text(row, object), 0, row->bytes))
+                continue;
+            return pen_fail(error, PEN_INVALID, pointer, "%s does not end.", row->name);
+        }
         double values[4];
         uint32_t scratch[128]; /* only the range check is wanted, not the store */
         struct pen_param flat = *row;

@@ -14,6 +14,11 @@ struct pen_scene_light {
     char name[60];
 };
 
+struct pen_scene_animation {
+    float duration_s;
+    char name[PEN_NAME_BYTES]; /* "" when it has none */
+};
+
 struct pen_scene_info { /* borrows its arrays */
     uint8_t id[PEN_ID_BYTES];
     uint64_t source_bytes; /* uploaded */
@@ -21,12 +26,13 @@ struct pen_scene_info { /* borrows its arrays */
     uint64_t gpu_bytes;    /* in GPU memory when resident */
     int64_t stored_unix_s; /* when it was uploaded; 0: not known */
     uint32_t resident;     /* 1: in GPU memory now */
-    uint32_t vertices, primitives, instances, materials, textures, images, animations;
+    uint32_t vertices, primitives, instances, materials, textures, images;
     uint64_t triangles;                  /* over all instances */
     double bounds_min[3], bounds_max[3]; /* m, world; min > max: no geometry */
-    uint32_t camera_count, light_count;
+    uint32_t camera_count, light_count, animation_count;
     const struct pen_scene_camera *cameras;
     const struct pen_scene_light *lights;
+    const struct pen_scene_animation *animations;
     const char *warnings; /* each ended by NUL, one after the other */
     size_t warning_bytes;
 };

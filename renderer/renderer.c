@@ -251,6 +251,8 @@ bool pen_renderer_render(struct pen_renderer *r, const struct pen_request *reque
     while (strcmp(technique_registry[t]->info.name, request->technique))
         t++;
     scene->last_use = ++r->clock;
+    if (!scene_set_pose(scene, request->animation, request->time_s, error))
+        goto fail;
     struct frame_job job = {.ctx = &r->ctx,
         .targets = &r->targets,
         .scene = scene,

@@ -71,7 +71,7 @@ static cJSON *row_value(
         args->status = cli_fail(CLI_USAGE, "%s: %s", flag, error.message);
         return NULL;
     }
-    if (row->choices || pen_param_is_word(row, &scratch))
+    if (row->choices || row->type == PEN_PARAM_TEXT || pen_param_is_word(row, &scratch))
         return cJSON_CreateString(text);
     if (row->type == PEN_PARAM_FLAG)
         return cJSON_CreateBool(pen_param_load(row, &scratch, 0) != 0);
@@ -242,15 +242,15 @@ static void print_row(const struct row_set *set, const struct pen_param *row)
             row->word ? row->word : "", name);
     else
         snprintf(usage, sizeof usage, "--%s %s%s%s", name,
-            row->choices      ? "NAME"
-            : row->count == 3 ? "X,Y,Z"
-                              : "N",
+            row->choices || row->type == PEN_PARAM_TEXT ? "NAME"
+            : row->count == 3                           ? "X,Y,Z"
+                                                        : "N",
             row->word ? "|" : "", row->word ? row->word : "");
     if (row->choices)
         for (int i = 0; row->choices[i]; i++)
             snprintf(range + strlen(range), sizeof range - strlen(range), "%s%s",
                 i ? " " : "one of: ", row->choices[i]);
-    else if (row->type != PEN_PARAM_FLAG)
+    else if (row->type != PEN_PARAM_FLAG && row->type != PEN_PARAM_TEXT)
         snprintf(range, sizeof range, "%g to %g%s%s", row->min, row->max, row->unit ? " " : "",
             row->unit ? row->unit : "");
     printf("  %-34s %s%s%s%s\n", usage, row->help, *range ? " (" : "", range, *range ? ")" : "");

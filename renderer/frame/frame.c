@@ -67,7 +67,7 @@ static void upload_view(struct frame *f, uint32_t number)
     bool empty = scene_is_empty(f->job->scene);
     b.ground[0] = center[0], b.ground[2] = center[2];
     /* A hair below the bounds, so that a floor of the scene itself hides it. */
-    b.ground[1] = (empty ? 0 : f->job->scene->blob.header->bounds_min[1]) - 1e-4f * radius;
+    b.ground[1] = (empty ? 0 : scene_floor(f->job->scene)) - 1e-4f * radius;
     b.ground[3] = 12 * radius;
     b.display[0] = exp2f(r->exposure_ev);
     b.display[1] = (float)r->tone_map;

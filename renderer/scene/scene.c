@@ -1,6 +1,6 @@
 #include "renderer/scene/scene.h"
 #include "protocol/memory.h"
-#include "protocol/number.h"
+#include "renderer/pose/pose.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -16,7 +16,8 @@ static GLuint make_buffer(struct scene *s, const void *data, size_t bytes)
 {
     GLuint name;
     gl.CreateBuffers(1, &name);
-    gl.NamedBufferStorage(name, bytes ? (GLsizeiptr)bytes : 16, bytes ? data : NULL, 0);
+    gl.NamedBufferStorage(name, bytes ? (GLsizeiptr)bytes : 16, bytes ? data : NULL,
+        s->file.motion.animation_count ? GL_DYNAMIC_STORAGE_BIT : 0);
     s->bytes += bytes;
     return name;
 }
@@ -36,10 +37,20 @@ static bool has_textures(const struct psc_material *m)
     return false;
 }
 
+/* Into a new buffer, or the one that there is. */
+static void put_buffer(struct scene *s, GLuint *buffer, const void *data, size_t bytes)
+{
+    if (!*buffer)
+        *buffer = make_buffer(s, data, bytes);
+    else if (bytes)
+        gl.NamedBufferSubData(*buffer, 0, (GLsizeiptr)bytes, data);
+}
+
 static void upload_materials(struct scene *s)
 {
     uint32_t n = s->blob.material_count;
     struct material_record *records = pen_alloc_zero(n, sizeof *records);
+    s->has_emission = s->has_gloss = s->has_unlit = false;
     for (uint32_t i = 0; i < n; i++) {
         const struct psc_material *m = &s->blob.materials[i];
         struct material_record *r = &records[i];
@@ -65,19 +76,19 @@ static void upload_materials(struct scene *s)
         s->has_gloss |= gloss || m->surface.texture >= 0;
         s->has_unlit |= (m->flags & PSC_UNLIT) != 0;
     }
-    s->materials = make_buffer(s, records, n * sizeof *records);
+    put_buffer(s, &s->materials, records, n * sizeof *records);
     free(records);
 }
 
 static void upload_instances(struct scene *s)
 {
-    uint32_t n = s->blob.instance_count;
+    uint32_t n = s->file.instance_count; /* those that the pose hides leave room at the end */
     struct instance_record *records = pen_alloc_zero(n, sizeof *records);
-    for (uint32_t i = 0; i < n; i++) {
+    for (uint32_t i = 0; i < s->blob.instance_count; i++) {
         memcpy(records[i].rows, s->blob.instances[i].world, 48);
         records[i].material = s->blob.primitives[s->blob.instances[i].primitive].material;
     }
-    s->instances = make_buffer(s, records, n * sizeof *records);
+    put_buffer(s, &s->instances, records, n * sizeof *records);
     free(records);
 }
 
@@ -190,6 +201,10 @@ static void make_groups(struct scene *s)
 {
     uint32_t n = s->blob.instance_count;
     uint64_t meshlets = 0;
+    free(s->order);
+    free(s->groups);
+    free(s->command_room);
+    s->group_count = 0;
     struct sortable *sorted = pen_alloc_zero(n + 1, sizeof *sorted);
     s->order = pen_alloc_zero(n + 1, sizeof *s->order);
     s->groups = pen_alloc_zero(n + 1, sizeof *s->groups);
@@ -214,11 +229,7 @@ static void make_groups(struct scene *s)
     }
     free(sorted);
     s->command_room = pen_alloc(meshlets + 1, sizeof *s->command_room);
-    gl.CreateBuffers(1, &s->commands);
 }
-
-static void bound_instances(struct scene *s);
-static void find_content(struct scene *s);
 
 static struct scene *upload(struct scene *s, struct pen_error *error)
 {
@@ -234,9 +245,8 @@ static struct scene *upload(struct scene *s, struct pen_error *error)
     s->depth_array = make_array(s, false);
     s->full_array = make_array(s, true);
     make_groups(s);
-    bound_instances(s);
-    find_content(s);
-    outline_make(&s->outline, &s->blob, (const float(*)[3])s->content);
+    gl.CreateBuffers(1, &s->commands);
+    scene_measure(s);
     if (gl.GetError() != GL_NO_ERROR) {
         pen_fail(error, PEN_INTERNAL, "", "The GPU has no memory left for this scene.");
         scene_destroy(s);
@@ -252,11 +262,29 @@ static struct scene *create(const uint8_t id[PEN_ID_BYTES])
     return s;
 }
 
+/* The rest pose of the file, without what it hides. */
+static struct scene *open_file(struct scene *s, struct pen_error *error)
+{
+    uint32_t changes;
+    s->blob = s->file;
+    s->pose = (struct scene_pose){-1, 0};
+    for (uint32_t i = 0; i < s->file.instance_count && !s->poses; i++)
+        if (s->file.instances[i].flags & PSC_HIDDEN)
+            s->poses = pose_create(&s->file);
+    if (s->poses && !pose_set(s->poses, -1, 0, &changes, error)) {
+        scene_destroy(s);
+        return NULL;
+    }
+    if (s->poses)
+        s->blob = *pose_scene(s->poses);
+    return upload(s, error);
+}
+
 struct scene *scene_create(const uint8_t id[PEN_ID_BYTES], int fd, struct pen_error *error)
 {
     struct scene *s = create(id);
-    if (psc_open(fd, &s->blob, error))
-        return upload(s, error);
+    if (psc_open(fd, &s->file, error))
+        return open_file(s, error);
     free(s);
     return NULL;
 }
@@ -265,8 +293,8 @@ struct scene *scene_create_memory(
     const uint8_t id[PEN_ID_BYTES], const void *data, size_t bytes, struct pen_error *error)
 {
     struct scene *s = create(id);
-    if (psc_open_memory(data, bytes, &s->blob, error))
-        return upload(s, error);
+    if (psc_open_memory(data, bytes, &s->file, error))
+        return open_file(s, error);
     free(s);
     return NULL;
 }
@@ -287,15 +315,28 @@ struct scene_attachment *scene_attachment(
     return a;
 }
 
+static void remove_attachment(struct scene *scene, struct scene_attachment **at)
+{
+    struct scene_attachment *attachment = *at;
+    *at = attachment->next;
+    scene->bytes -= attachment->bytes;
+    attachment->destroy(attachment);
+}
+
+void scene_detach(struct scene *scene, struct scene_attachment *attachment)
+{
+    struct scene_attachment **at = &scene->attachments;
+    while (*at != attachment)
+        at = &(*at)->next;
+    remove_attachment(scene, at);
+}
+
 void scene_destroy(struct scene *s)
 {
     if (!s)
         return;
-    while (s->attachments) {
-        struct scene_attachment *attachment = s->attachments;
-        s->attachments = attachment->next;
-        attachment->destroy(attachment);
-    }
+    while (s->attachments)
+        remove_attachment(s, &s->attachments);
     GLuint buffers[] = {
         s->positions, s->attributes, s->indices, s->instances, s->materials, s->commands};
     gl.DeleteBuffers(sizeof buffers / sizeof *buffers, buffers);
@@ -311,120 +352,65 @@ void scene_destroy(struct scene *s)
     free(s->order);
     free(s->groups);
     free(s->command_room);
-    psc_close(&s->blob);
+    pose_destroy(s->poses);
+    psc_close(&s->file);
     free(s);
 }
 
-bool scene_is_empty(const struct scene *s)
+static void upload_moved(struct scene *s)
 {
-    return !(s->blob.header->bounds_min[0] <= s->blob.header->bounds_max[0]);
-}
-
-float scene_radius(const struct scene *s)
-{
-    if (scene_is_empty(s))
-        return 1;
-    float sum = 0;
-    for (int i = 0; i < 3; i++) {
-        float d = s->content[1][i] - s->content[0][i];
-        sum += d * d;
-    }
-    return fmaxf(0.5f * sqrtf(sum), 1e-9f);
-}
-
-void scene_center(const struct scene *s, float center[3])
-{
-    for (int i = 0; i < 3; i++)
-        center[i] = scene_is_empty(s) ? 0 : 0.5f * (s->content[0][i] + s->content[1][i]);
-}
-
-void scene_point_in(const struct scene *s, const double world[3], float point[3])
-{
-    for (int i = 0; i < 3; i++)
-        point[i] = (float)(world[i] - s->blob.header->origin[i]);
-}
-
-void scene_point_out(const struct scene *s, const float point[3], double world[3])
-{
-    for (int i = 0; i < 3; i++)
-        world[i] = s->blob.header->origin[i] + pen_widen(point[i]);
-}
-
-void scene_direction(const double from[3], const double to[3], float direction[3])
-{
-    double d[3], size = 0;
-    for (int i = 0; i < 3; i++) {
-        d[i] = to[i] - from[i];
-        size = fmax(size, fabs(d[i]));
-    }
-    for (int i = 0; i < 3; i++)
-        direction[i] = size > 0 ? (float)ldexp(d[i], -ilogb(size)) : 0;
-}
-
-/* Vertices transformed for tight bounds, per scene: a few milliseconds' worth. */
-#define BOUND_BUDGET (8u << 20)
-
-static void grow(float bounds[2][3], const float m[12], const float p[3])
-{
-    for (int r = 0; r < 3; r++) {
-        float w = m[4 * r] * p[0] + m[4 * r + 1] * p[1] + m[4 * r + 2] * p[2] + m[4 * r + 3];
-        bounds[0][r] = fminf(bounds[0][r], w);
-        bounds[1][r] = fmaxf(bounds[1][r], w);
+    uint32_t count;
+    const uint32_t *moved = pose_moved(s->poses, &count);
+    for (uint32_t i = 0; i < count; i++) {
+        const struct psc_primitive *p = &s->blob.primitives[moved[i]];
+        size_t first = p->first_vertex, n = p->vertex_count;
+        gl.NamedBufferSubData(
+            s->positions, (GLintptr)(12 * first), (GLsizeiptr)(12 * n), s->blob.positions[first]);
+        gl.NamedBufferSubData(s->attributes, (GLintptr)(first * sizeof(struct psc_attributes)),
+            (GLsizeiptr)(n * sizeof(struct psc_attributes)), &s->blob.attributes[first]);
     }
 }
 
-static void bound_instances(struct scene *s)
+/* GPU memory follows the pose: only what moves is written again, textures never. */
+static void follow_pose(struct scene *s, uint32_t changes)
 {
-    uint64_t left = BOUND_BUDGET;
-    s->instance_bounds = pen_alloc_zero(s->blob.instance_count, sizeof *s->instance_bounds);
-    for (uint32_t i = 0; i < s->blob.instance_count; i++) {
-        const struct psc_instance *instance = &s->blob.instances[i];
-        const struct psc_primitive *p = &s->blob.primitives[instance->primitive];
-        float(*bounds)[3] = s->instance_bounds[i];
-        for (int k = 0; k < 3; k++)
-            bounds[0][k] = INFINITY, bounds[1][k] = -INFINITY;
-        if (p->vertex_count <= left) {
-            left -= p->vertex_count;
-            for (uint32_t v = 0; v < p->vertex_count; v++)
-                grow(bounds, instance->world, s->blob.positions[p->first_vertex + v]);
-        } else {
-            for (int c = 0; c < 8; c++)
-                grow(bounds, instance->world,
-                    (float[3]){c & 1 ? p->bounds_max[0] : p->bounds_min[0],
-                        c & 2 ? p->bounds_max[1] : p->bounds_min[1],
-                        c & 4 ? p->bounds_max[2] : p->bounds_min[2]});
-        }
-    }
+    s->blob = *pose_scene(s->poses);
+    if (changes & POSE_VERTICES)
+        upload_moved(s);
+    if (changes & (POSE_INSTANCES | POSE_STATE))
+        upload_instances(s);
+    if (changes & POSE_STATE)
+        make_groups(s);
+    if (changes & POSE_MATERIALS)
+        upload_materials(s);
+    if (changes & (POSE_VERTICES | POSE_INSTANCES | POSE_STATE))
+        scene_measure(s);
+    s->moved += (changes & (POSE_VERTICES | POSE_INSTANCES)) != 0;
+    s->remade += (changes & (POSE_STATE | POSE_ALPHA)) != 0;
 }
 
-void scene_instance_bounds(const struct scene *s, uint32_t instance, float min[3], float max[3])
+bool scene_set_pose(struct scene *s, const char *animation, float time_s, struct pen_error *error)
 {
-    memcpy(min, s->instance_bounds[instance][0], 12);
-    memcpy(max, s->instance_bounds[instance][1], 12);
-}
-
-static void find_content(struct scene *s)
-{
-    const struct psc_header *h = s->blob.header;
-    float flat = 1e-4f * (h->bounds_max[1] - h->bounds_min[1]);
-    bool any = false;
-    for (uint32_t i = 0; i < s->blob.instance_count; i++) {
-        float min[3], max[3];
-        scene_instance_bounds(s, i, min, max);
-        if (max[1] <= h->bounds_min[1] + flat)
-            continue; /* a floor at the very bottom */
-        for (int k = 0; k < 3; k++) {
-            s->content[0][k] = any ? fminf(s->content[0][k], min[k]) : min[k];
-            s->content[1][k] = any ? fmaxf(s->content[1][k], max[k]) : max[k];
-        }
-        any = true;
+    struct scene_pose pose;
+    uint32_t changes;
+    if (!pose_find(&s->file, animation, &pose.animation, error))
+        return false;
+    pose.time_s = pose_clamp(&s->file, pose.animation, time_s);
+    if (pose.animation == s->pose.animation && pose.time_s == s->pose.time_s)
+        return true;
+    if (!s->poses)
+        s->poses = pose_create(&s->file);
+    s->pose = pose;
+    bool fits = pose_set(s->poses, pose.animation, pose.time_s, &changes, error);
+    if (!fits) { /* back to where nothing is out of range */
+        s->pose = (struct scene_pose){-1, 0};
+        pose_destroy(s->poses);
+        s->poses = pose_create(&s->file);
+        pose_set(s->poses, -1, 0, &changes, NULL);
+        changes = POSE_VERTICES | POSE_INSTANCES | POSE_STATE | POSE_MATERIALS | POSE_ALPHA;
     }
-    if (any) {
-        s->content[0][1] = h->bounds_min[1]; /* it stands on that floor */
-        return;
-    }
-    memcpy(s->content[0], h->bounds_min, sizeof s->content[0]);
-    memcpy(s->content[1], h->bounds_max, sizeof s->content[1]);
+    follow_pose(s, changes);
+    return fits;
 }
 
 static void bind_material(struct scene *s, uint32_t material)

@@ -30,9 +30,18 @@ struct scene_attachment {
     uint64_t bytes;                           /* of GPU memory; counts as the scene's */
 };
 
+/* What poses a scene; equal ones are equal bit by bit. */
+struct scene_pose {
+    int32_t animation; /* -1: the rest pose, at time 0 */
+    float time_s;      /* within the animation */
+};
+
 struct scene {
     uint8_t id[PEN_ID_BYTES];
-    struct psc_scene blob; /* stays mapped: culling and tracing read it */
+    struct psc_scene file; /* as mapped: the rest pose */
+    struct psc_scene blob; /* as posed: culling and tracing read it */
+    struct pose *poses;    /* NULL: never posed */
+    struct scene_pose pose;
     GLuint positions, attributes, indices, instances, materials, commands;
     GLuint depth_array, full_array; /* vertex arrays: positions only; everything */
     struct gl_texture *images;
@@ -49,6 +58,8 @@ struct scene {
     uint64_t bytes;
     uint64_t last_use;
     struct scene_attachment *attachments;
+    uint32_t moved;  /* counts the poses that put vertices or instances elsewhere */
+    uint32_t remade; /* counts those with other instances, or other alpha */
 };
 
 /* Uploads the blob behind `fd`. Errors as psc_open; PEN_INTERNAL out of GPU memory. */
@@ -62,6 +73,17 @@ void scene_attach(struct scene *scene, struct scene_attachment *attachment);
 /* The one that ends with `destroy`; NULL: none. */
 struct scene_attachment *scene_attachment(
     const struct scene *scene, void (*destroy)(struct scene_attachment *attachment));
+void scene_detach(struct scene *scene, struct scene_attachment *attachment); /* and destroys it */
+
+/* Poses it by one of its animations ("": at rest; see pose_find), held within the animation's time.
+ * Buffers, bounds and all that was derived from the pose before follow. Errors: PEN_INVALID; the
+ * scene is then at rest. */
+bool scene_set_pose(
+    struct scene *scene, const char *animation, float time_s, struct pen_error *error);
+/* measure.c: of the scene as posed, once it is; everything below follows from it. */
+void scene_measure(struct scene *scene);
+/* What a ground lies under, m: the bounds' lowest point, now or at rest. */
+float scene_floor(const struct scene *scene);
 
 bool scene_is_empty(const struct scene *scene);
 /* Of the sphere around the content, m; >= 1e-9. Cameras and lights are chosen to suit it: a floor

@@ -7,6 +7,7 @@
 
 #define BINS 16
 #define NODE_COST 1.0f /* relative to a triangle test */
+#define WORN_OUT 1.5   /* so many times the cost as built, and a new tree is worth its time */
 #define MAX_DEPTH (PEN_BVH_STACK - 1)
 
 struct box {
@@ -214,6 +215,17 @@ static void build_nodes(struct item *items, uint32_t count, struct pen_bvh *bvh)
     bvh->cost = root_area > 0 ? (float)(cost / root_area) : (float)count;
 }
 
+static struct box box_of_triangle(const struct pen_bvh_triangle *t)
+{
+    struct box box;
+    for (int c = 0; c < 3; c++) {
+        float a = t->corner[c], b = a + t->edge1[c], d = a + t->edge2[c];
+        box.low[c] = lesser(a, lesser(b, d));
+        box.high[c] = greater(a, greater(b, d));
+    }
+    return box;
+}
+
 bool pen_bvh_build(const struct pen_bvh_triangle *triangles, uint32_t count, struct pen_bvh *bvh,
     struct pen_error *error)
 {
@@ -228,13 +240,7 @@ bool pen_bvh_build(const struct pen_bvh_triangle *triangles, uint32_t count, str
     }
     for (uint32_t i = 0; i < count; i++) {
         const struct pen_bvh_triangle *t = &triangles[i];
-        struct box *box = &items[i].box;
-        items[i].triangle = i;
-        for (int c = 0; c < 3; c++) {
-            float a = t->corner[c], b = a + t->edge1[c], d = a + t->edge2[c];
-            box->low[c] = lesser(a, lesser(b, d));
-            box->high[c] = greater(a, greater(b, d));
-        }
+        items[i] = (struct item){box_of_triangle(t), i};
     }
     build_nodes(items, count, bvh);
     for (uint32_t i = 0; i < count; i++)
@@ -322,6 +328,40 @@ bool pen_bvh_build_scene(const struct psc_scene *scene, uint64_t max_triangles, 
     bool ok = pen_bvh_build(triangles, (uint32_t)count, bvh, error);
     free(triangles);
     return ok;
+}
+
+bool pen_bvh_refit(
+    struct pen_bvh *bvh, const struct psc_scene *scene, const uint32_t *first_indices)
+{
+    double cost = 0;
+    for (uint32_t i = 0; i < bvh->triangle_count; i++) {
+        struct pen_bvh_triangle *t = &bvh->triangles[i];
+        uint32_t first = first_indices ? first_indices[i] : t->first_index, kept = t->first_index;
+        *t = make_triangle(scene, t->instance, first, (t->flags & PEN_BVH_ALPHA) != 0);
+        t->first_index = kept;
+    }
+    for (uint32_t i = bvh->node_count; i-- > 0;) { /* children come after their parent */
+        struct pen_bvh_node *node = &bvh->nodes[i];
+        bool leaf = node->count > 0 || !bvh->triangle_count;
+        struct box box = empty_box;
+        for (uint32_t k = 0; k < (leaf ? node->count : 2); k++) {
+            const struct pen_bvh_node *child = &bvh->nodes[node->first + k];
+            struct box part;
+            if (leaf)
+                part = box_of_triangle(&bvh->triangles[node->first + k]);
+            else {
+                memcpy(part.low, child->low, sizeof part.low);
+                memcpy(part.high, child->high, sizeof part.high);
+            }
+            grow(&box, &part);
+        }
+        memcpy(node->low, box.low, sizeof node->low);
+        memcpy(node->high, box.high, sizeof node->high);
+        cost += (double)half_area(&box) * (leaf ? node->count : (double)NODE_COST);
+        if (i == 0 && half_area(&box) > 0)
+            cost /= (double)half_area(&box);
+    }
+    return cost <= WORN_OUT * (double)bvh->cost;
 }
 
 /* Where the ray enters the node's box; infinite when it does not before `limit`. */

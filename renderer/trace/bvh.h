@@ -16,7 +16,7 @@ struct pen_bvh {
     struct pen_bvh_triangle *triangles; /* in leaf order */
     uint32_t node_count, triangle_count;
     uint32_t depth; /* of the deepest leaf, root 0; below PEN_BVH_STACK */
-    float cost;     /* expected node and triangle tests of a ray that hits the root box */
+    float cost;     /* expected node and triangle tests of a ray that hits the root box, as built */
 };
 
 /* The triangles of all instances that can cast (casters.h). Binned surface-area heuristic (Wald
@@ -27,6 +27,12 @@ bool pen_bvh_build_scene(const struct psc_scene *scene, uint64_t max_triangles, 
 /* The same over `count` triangles of the caller's, which are copied. */
 bool pen_bvh_build(const struct pen_bvh_triangle *triangles, uint32_t count, struct pen_bvh *bvh,
     struct pen_error *error);
+/* The scene's vertices and instances moved: gives each node its new box, in the tree that is there.
+ * `first_indices`: of the triangles in PSC_INDICES, where first_index says something else by now;
+ * NULL: it does not. False when a walk has become so much dearer that building anew pays; the boxes
+ * are right all the same. The scene has the instances and primitives that the tree was made of. */
+bool pen_bvh_refit(
+    struct pen_bvh *bvh, const struct psc_scene *scene, const uint32_t *first_indices);
 void pen_bvh_finish(struct pen_bvh *bvh); /* harmless on a zeroed one */
 
 /* Whether a triangle lies on origin + t direction, 0 < t < limit, under the rule of shadows:

@@ -41,6 +41,7 @@ void calibration_setup(
     hash_key(&key, setup);
     memset(&key.camera, 0, sizeof key.camera);
     key.time_s = 0;
+    memset(key.animation, 0, sizeof key.animation);
     for (uint32_t i = 0; i < PEN_MAX_LIGHTS; i++) {
         struct pen_light *light = &key.lights[i];
         memset(light->position, 0, sizeof light->position);

@@ -38,10 +38,10 @@ static char *describe_scene(
         .materials = scene->material_count,
         .textures = scene->texture_count,
         .images = scene->image_count,
-        .animations = scene->motion.animation_count,
         .triangles = scene->header->triangles,
         .camera_count = scene->camera_count,
         .light_count = scene->light_count,
+        .animation_count = scene->motion.animation_count,
         .warnings = scene->warnings,
         .warning_bytes = scene->warning_bytes,
     };
@@ -67,9 +67,18 @@ static char *describe_scene(
         snprintf(lights[i].name, sizeof lights[i].name, "%.*s",
             (int)strnlen(from->name, sizeof from->name), from->name);
     }
+    struct pen_scene_animation *animations =
+        pen_alloc_zero(info.animation_count, sizeof *animations);
+    for (uint32_t i = 0; i < info.animation_count; i++) {
+        const struct psc_animation *from = &scene->motion.animations[i];
+        animations[i].duration_s = from->duration_s;
+        snprintf(animations[i].name, sizeof animations[i].name, "%s", from->name);
+    }
+    info.animations = animations;
     info.cameras = cameras;
     info.lights = lights;
     char *text = pen_scene_json(&info);
+    free(animations);
     free(cameras);
     free(lights);
     return text;

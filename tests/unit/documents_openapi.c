@@ -90,6 +90,10 @@ static void check_row(const struct pen_param *row, const char *where)
     } else if (row->type == PEN_PARAM_FLAG) {
         CHECK(cJSON_IsBool(value) && cJSON_IsTrue(value) == (row->def != 0));
         return;
+    } else if (row->type == PEN_PARAM_TEXT) {
+        CHECK_STR(value->valuestring, "");
+        CHECK_STR(cJSON_GetArrayItem(member(schema, "type"), 0)->valuestring, "string");
+        return;
     } else
         CHECK(row->automatic || value->valuedouble == row->def);
     CHECK_STR(member(one, "type")->valuestring, pen_param_is_real(row) ? "number" : "integer");

@@ -219,7 +219,7 @@ static uint32_t rows_out_of_range(
     uint32_t tried = 0;
     for (uint32_t r = 0; r < table.count; r++) {
         const struct pen_param *row = &table.rows[r];
-        if (row->choices || row->type == PEN_PARAM_FLAG ||
+        if (row->choices || row->type == PEN_PARAM_FLAG || row->type == PEN_PARAM_TEXT ||
             (applies && row->applies && !(row->applies & applies)))
             continue;
         double steps[] = {row->min - fmax(1, fabs(row->min)) * 0.01 - !pen_param_is_real(row),

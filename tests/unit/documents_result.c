@@ -27,6 +27,11 @@ static void randomise_row(const struct pen_param *row, void *object)
 {
     struct pen_error error = {0};
     double values[4];
+    if (row->type == PEN_PARAM_TEXT) {
+        static const char *const names[] = {"", "walk", "12", "L\xc3\xa4uft \"schnell\""};
+        CHECK(pen_param_store_text(row, object, names[random_u32() % 4], "", &error));
+        return;
+    }
     do {
         error.code = PEN_OK;
         for (uint32_t i = 0; i < row->count; i++) {

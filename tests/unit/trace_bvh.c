@@ -249,8 +249,85 @@ static void test_scene(void)
     psc_builder_destroy(builder);
 }
 
+/* After a scene has moved, the refitted tree and one built anew let the same rays through. */
+static void compare_moved(struct pen_bvh *moved, const struct psc_scene *scene, bool expected)
+{
+    struct pen_bvh fresh;
+    CHECK(pen_bvh_refit(moved, scene, NULL) == expected);
+    CHECK(pen_bvh_build_scene(scene, 0, &fresh, NULL));
+    CHECK(fresh.triangle_count == moved->triangle_count);
+    int hits = 0, wrong = 0;
+    for (int i = 0; i < 4000; i++) {
+        float origin[3], direction[3];
+        for (int k = 0; k < 3; k++) {
+            origin[k] = uniform(-9, 9);
+            direction[k] = uniform(-1, 1);
+        }
+        bool one = pen_bvh_occluded(moved, i % 2, origin, direction, 30);
+        hits += one;
+        wrong += one != pen_bvh_occluded(&fresh, i % 2, origin, direction, 30);
+    }
+    printf("moved: %d of 4000 rays hit, %d wrong\n", hits, wrong);
+    CHECK(wrong == 0 && hits > 100 && hits < 3900);
+    pen_bvh_finish(&fresh);
+}
+
+static void test_refit(void)
+{
+    enum { TRIANGLES = 400 };
+    static float corners[3 * TRIANGLES][3];
+    for (int t = 0; t < TRIANGLES; t++)
+        for (int c = 0; c < 3; c++)
+            for (int k = 0; k < 3; k++)
+                corners[3 * t + c][k] =
+                    c ? corners[3 * t][k] + uniform(-0.4f, 0.4f) : uniform(-2, 2);
+    struct psc_builder *builder = psc_builder_create();
+    struct psc_material material = psc_material_default();
+    struct psc_mesh mesh = {.positions = (const float(*)[3])corners,
+        .vertex_count = 3 * TRIANGLES,
+        .index_count = 3 * TRIANGLES,
+        .material = psc_builder_add_material(builder, &material)};
+    uint32_t primitive = 0;
+    CHECK(psc_builder_add_mesh(builder, &mesh, &primitive, NULL));
+    float worlds[3][12] = {{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0},
+        {-1, 0, 0, 4, 0, 1, 0, 0, 0, 0, 1, 0}, {1, 0, 0, -4, 0, 1, 0, 1, 0, 0, 1, 2}};
+    for (int i = 0; i < 3; i++)
+        psc_builder_add_instance(builder, primitive, worlds[i]);
+    static const uint8_t source[PEN_ID_BYTES];
+    void *data;
+    size_t bytes;
+    struct psc_scene scene;
+    struct pen_bvh bvh;
+    CHECK(psc_builder_finish(builder, source, &data, &bytes, NULL));
+    CHECK(psc_open_memory(data, bytes, &scene, NULL));
+    CHECK(pen_bvh_build_scene(&scene, 0, &bvh, NULL));
+    struct psc_instance instances[3];
+    memcpy(instances, scene.instances, sizeof instances);
+    scene.instances = instances;
+    compare_moved(&bvh, &scene, true);
+    for (int i = 0; i < 3; i++) /* all by a quarter turn around z, and away */
+        for (int k = 0; k < 4; k++) {
+            float x = instances[i].world[k], y = instances[i].world[4 + k];
+            instances[i].world[k] = (float)(k == 3) - y;
+            instances[i].world[4 + k] = x;
+        }
+    compare_moved(&bvh, &scene, true);
+    for (int t = 0; t < TRIANGLES; t++) /* neighbours no more: a bad tree, but a right one */
+        for (int k = 0; k < 3; k++) {
+            float shift = uniform(-4, 4);
+            for (int c = 0; c < 3; c++)
+                corners[3 * t + c][k] += shift;
+        }
+    scene.positions = (const float(*)[3])corners;
+    compare_moved(&bvh, &scene, false);
+    pen_bvh_finish(&bvh);
+    free(data);
+    psc_builder_destroy(builder);
+}
+
 int main(void)
 {
+    test_refit();
     test_shapes();
     test_heuristic();
     test_scene();

@@ -14,6 +14,7 @@ struct face_key {
 struct entry {
     struct entry *next;
     const struct scene *scene;
+    struct scene_pose pose;
     struct face_key face;
     struct shadow_key key;
     struct shadow_input input;
@@ -71,7 +72,8 @@ const struct shadow_input *shadow_cache_get(struct technique_run *run, const str
     struct face_key face;
     make_face_key(run->face, run->request->casters, &face);
     for (struct entry *e = cache->entries; e; e = e->next)
-        if (e->scene == run->scene && e->key.size == key->size && !strcmp(e->key.kind, key->kind) &&
+        if (e->scene == run->scene && !memcmp(&e->pose, &run->scene->pose, sizeof e->pose) &&
+            e->key.size == key->size && !strcmp(e->key.kind, key->kind) &&
             !memcmp(e->key.extra, key->extra, sizeof key->extra) &&
             !memcmp(&e->face, &face, sizeof face)) {
             e->last_frame = cache->frame;
@@ -79,6 +81,7 @@ const struct shadow_input *shadow_cache_get(struct technique_run *run, const str
         }
     struct entry *e = pen_alloc_zero(1, sizeof *e);
     e->scene = run->scene;
+    e->pose = run->scene->pose;
     e->face = face;
     e->key = *key;
     e->last_frame = cache->frame;

@@ -6,7 +6,7 @@
 #define SHADOW_INPUT_TEXTURES 6
 
 /* What an input is. A kind of a new method is a string literal of its own: two inputs are the same
- * when kind, scene, light face, size and extra agree. */
+ * when kind, scene and its pose, light face, size and extra agree. */
 struct shadow_key {
     const char *kind;  /* "depth", "minmax", ... */
     uint32_t size;     /* map texels per side */

@@ -2,6 +2,7 @@
  * when first needed and kept with the scene until it leaves the GPU. */
 #pragma once
 #include "renderer/technique.h"
+#include "renderer/trace/bvh.h"
 
 /* Binding points of all that is about rays. */
 #define SHARED_ROWS "renderer/shaders/rays/rays.def"
@@ -13,6 +14,9 @@ struct ray_scene {
     GLuint alpha_triangles, alpha_words; /* ray_alpha.glsl; 0 without alpha */
     uint32_t node_count;                 /* 0: nothing casts */
     float extent;                        /* largest absolute coordinate, m */
+    uint32_t moved, remade;              /* the scene's, when it was last made to fit */
+    struct pen_bvh bvh;                  /* of a scene that moves, to be refitted; else empty */
+    uint32_t *first_indices;             /* of its triangles in PSC_INDICES */
 };
 
 /* Its memory counts as the scene's. Errors: PEN_TOO_BIG when it does not fit the budget or a

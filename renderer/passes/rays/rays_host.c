@@ -9,6 +9,7 @@
 struct host_scene {
     struct scene_attachment attachment;
     struct pen_trace_scene *trace;
+    uint32_t moved, remade; /* the scene's, when it was made */
 };
 
 static void destroy(struct scene_attachment *attachment)
@@ -21,14 +22,20 @@ static void destroy(struct scene_attachment *attachment)
 static struct pen_trace_scene *trace_scene(struct scene *scene, struct pen_error *error)
 {
     struct scene_attachment *known = scene_attachment(scene, destroy);
-    if (known)
-        return container_of(known, struct host_scene, attachment)->trace;
+    if (known) {
+        struct host_scene *s = container_of(known, struct host_scene, attachment);
+        if (s->moved == scene->moved && s->remade == scene->remade)
+            return s->trace;
+        scene_detach(scene, known);
+    }
     struct pen_trace_scene *trace = pen_trace_scene_create(&scene->blob, NULL, error);
     if (!trace)
         return NULL;
     struct host_scene *s = pen_alloc_zero(1, sizeof *s);
     s->attachment.destroy = destroy;
     s->trace = trace;
+    s->moved = scene->moved;
+    s->remade = scene->remade;
     scene_attach(scene, &s->attachment);
     return trace;
 }

@@ -8,6 +8,7 @@
 
 #define FAKE_PATH "C:/fakepath/"
 #define VARIANTS 4
+#define BLANKS " \t\r\n"
 
 bool pen_name_is_safe(const char *name, size_t bytes)
 {
@@ -186,6 +187,8 @@ static const char *path_of(char *text, bool *outside)
     turn_slashes(text);
     if (!strncasecmp(text, "file:", 5))
         text += 5, *outside = true;
+    while (*outside && text[0] == '/' && (text[1] == '/' || (is_letter(text[1]) && text[2] == ':')))
+        text++;
     if (is_letter(text[0]) && text[1] == ':')
         text += 2, *outside = true;
     *outside = *outside || text[0] == '/';
@@ -193,7 +196,7 @@ static const char *path_of(char *text, bool *outside)
     return colon && (!slash || colon < slash) ? NULL : text;
 }
 
-int64_t pen_names_find(const struct pen_names *index, const char *base, const char *uri, bool loose)
+static int64_t find(const struct pen_names *index, const char *base, const char *uri, bool loose)
 {
     struct pen_name_keys wanted[VARIANTS];
     char names[VARIANTS][PEN_BUNDLE_MAX_NAME + 1];
@@ -230,4 +233,21 @@ int64_t pen_names_find(const struct pen_names *index, const char *base, const ch
         free(wanted[k].folded);
     }
     return found == PEN_NAME_UNKNOWN && elsewhere ? PEN_NAME_ELSEWHERE : found;
+}
+
+int64_t pen_names_find(const struct pen_names *index, const char *base, const char *uri, bool loose)
+{
+    char text[4 * PEN_BUNDLE_MAX_NAME + 1];
+    int64_t found = find(index, base, uri, loose);
+    size_t bytes = strlen(uri), first = strspn(uri, BLANKS);
+    if (found >= 0 || !loose || first == bytes || bytes >= sizeof text)
+        return found;
+    size_t last = bytes;
+    while (strchr(BLANKS, uri[last - 1]))
+        last--;
+    if (last - first == bytes)
+        return found;
+    memcpy(text, uri + first, last - first); /* without the blanks around it */
+    text[last - first] = 0;
+    return find(index, base, text, loose);
 }

@@ -134,6 +134,10 @@ static void spellings(void)
     check("C:\\fakepath\\scene.gltf", "a.bin", "C:\\fakepath\\a.bin", PEN_OK);
     check("D:\\work\\scene.gltf", "tex/a.bin", "D:\\work\\tex\\a.bin", PEN_OK);
     check("./scene.gltf", "a.bin", "./a.bin", PEN_OK);
+    check("scene.gltf", " a.bin\\t", "a.bin", PEN_OK); /* JSON: a tab */
+    check("scene.gltf", " a.bin", " a.bin", PEN_OK);
+    check("scene.gltf", "file:///C:/Users/me/a.bin", "a.bin", PEN_OK);
+    check("scene.gltf", "file://C:\\\\Users\\\\me\\\\a.bin", "a.bin", PEN_OK);
     check("C:\\..\\scene.gltf", "a.bin", "a.bin", PEN_INVALID);
     check("scene.gltf", "a.bin", "..\\a.bin", PEN_INVALID);
 }

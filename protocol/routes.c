@@ -13,7 +13,8 @@ _Static_assert(PEN_ROUTES <= 64, "struct pen_route_match has a bit for each");
 const char *const *pen_upload_types(enum pen_body body)
 {
     static const char *const scene[] = {"model/gltf-binary", "model/gltf+json", "application/zip",
-        "application/x-zip-compressed", "multipart/form-data", "application/octet-stream", NULL};
+        "application/x-zip-compressed", "application/json", "multipart/form-data",
+        "application/octet-stream", NULL};
     static const char *const image[] = {"image/png", "image/jpeg", "image/webp",
         "multipart/form-data", "application/octet-stream", NULL};
     return body == PEN_BODY_SCENE_UPLOAD ? scene : body == PEN_BODY_IMAGE_UPLOAD ? image : NULL;

@@ -2,6 +2,7 @@
 #include "renderer/import/base/text.h"
 #include "renderer/import/bundle.h"
 #include "renderer/import/convert/convert.h"
+#include "renderer/import/files/foreign.h"
 #include "renderer/import/image/image.h"
 #include "renderer/pose/bake.h"
 #include <stdlib.h>
@@ -79,6 +80,7 @@ static bool import_scene(
         return pen_fail(error, PEN_INVALID, "", "The upload is truncated.");
     if (!upload.bytes)
         return pen_fail(error, PEN_INVALID, "", "The upload is empty.");
+    const char *foreign = imp_foreign_bytes(upload.data, upload.bytes);
     bool is_zip = begins(upload, "PK\3\4") || begins(upload, "PK\5\6");
     if (begins(upload, PEN_BUNDLE_MAGIC) || is_zip)
         done = (is_zip ? imp_files_open_zip : imp_files_open_bundle)(
@@ -86,7 +88,8 @@ static bool import_scene(
                import_files(builder, &files, entry, error);
     else if (!begins(upload, "glTF") && !is_json(upload.data, upload.bytes))
         pen_fail(error, PEN_UNKNOWN_TYPE, "",
-            "The upload is neither glTF binary nor glTF JSON nor a zip of them.");
+            "The upload is neither glTF binary nor glTF JSON nor a zip of them.%s%s",
+            foreign ? " " : "", foreign ? foreign : "");
     else if (entry)
         pen_fail(error, PEN_INVALID, "/entry",
             "entry chooses among the files of an upload; this one is a single file.");

@@ -211,6 +211,31 @@ static void formats(void)
     imported_free(&r);
 }
 
+/* The first source that can be read counts, whichever extension names it: here a PNG. */
+static void sources(void)
+{
+    const char *const names[] = {
+        "EXT_texture_avif", "EXT_texture_webp", "KHR_texture_basisu", "MSFT_texture_dds"};
+    struct bytes file = png(four, 2, 2, SPNG_COLOR_TYPE_TRUECOLOR_ALPHA, 8, 16);
+    for (size_t i = 0; i < 2 * sizeof names / sizeof *names; i++) {
+        bool fallback = i % 2; /* else the extension's own */
+        char *json =
+            text(HEAD TRIANGLES(TRIANGLE("0")) ",\"materials\":[{\"pbrMetallicRoughness\":{"
+                                               "\"baseColorTexture\":{\"index\":0}}}],"
+                                               "\"textures\":[{\"source\":%d,\"extensions\":{"
+                                               "\"%s\":{\"source\":%d}}}],\"images\":["
+                                               "{\"uri\":\"data:image/ktx2;base64,q0tUWCAyMLs=\"},"
+                                               "{\"uri\":\"data:;base64,%s\"}]}",
+                fallback, names[i / 2], !fallback, base64(file.data, file.bytes));
+        struct imported r = import_json(json);
+        CHECK(r.ok && !has_warning(&r.scene, "drawn plain"));
+        CHECK(r.ok && !memcmp(texel(&r.scene, 0, 0, 0), four, 8));
+        imported_free(&r);
+        free(json);
+    }
+    free(file.data);
+}
+
 /* One image that cannot be decoded, in every role: what it becomes there changes nothing. */
 static void plain(void)
 {
@@ -374,6 +399,7 @@ int main(void)
     factors();
     five_slots();
     formats();
+    sources();
     plain();
     reflectance();
     image_mode();

@@ -57,11 +57,15 @@ static const uint8_t neutral[IMP_ROLES][4] = {[IMP_BASE] = {255, 255, 255, 255},
     [IMP_NORMAL] = {128, 128, 255, 255},
     [IMP_OCCLUSION] = {255, 255, 255, 255}};
 
-static uint32_t image_slot(struct imp_context *context, uint32_t image, enum imp_role role)
+static bool is_readable(const struct imp_context *context, uint32_t image)
 {
     uint32_t width, height;
-    bool readable = image != IMP_NOT_YET &&
-                    imp_image_header(context->document->images[image].data, &width, &height, NULL);
+    return imp_image_header(context->document->images[image].data, &width, &height, NULL);
+}
+
+static uint32_t image_slot(struct imp_context *context, uint32_t image, enum imp_role role)
+{
+    bool readable = image != IMP_NOT_YET && is_readable(context, image);
     for (uint32_t i = 0; i < context->image_slot_count; i++) {
         const struct imp_image_slot *slot = &context->image_slots[i];
         if (slot->image == image &&
@@ -72,16 +76,30 @@ static uint32_t image_slot(struct imp_context *context, uint32_t image, enum imp
     return context->image_slot_count++;
 }
 
+/* The first that can be read; when none can, the last, of which the warning tells. */
+static uint32_t choose_image(const struct imp_context *context, const struct gltf_texture *from)
+{
+    uint32_t last = IMP_NOT_YET;
+    for (int i = 0; i < GLTF_TEXTURE_SOURCES; i++) {
+        uint32_t image = (uint32_t)from->images[i];
+        if (image >= context->document->image_count)
+            continue;
+        last = image;
+        if (is_readable(context, image))
+            return image;
+    }
+    return last;
+}
+
 int32_t imp_texture(struct imp_context *context, int32_t number, enum imp_role role)
 {
     if (number < 0 || (uint32_t)number >= context->model->texture_count)
         return -1;
     const struct gltf_texture *from = &context->model->textures[number];
-    bool has_image = from->image >= 0 && (uint32_t)from->image < context->document->image_count;
-    if (!has_image)
-        imp_warn(context, "A texture without a PNG, JPEG or WebP image is drawn plain.");
+    uint32_t image = choose_image(context, from);
+    if (image == IMP_NOT_YET)
+        imp_warn(context, "A texture without an image is drawn plain.");
     uint32_t *roles = &context->textures[IMP_ROLES * (uint32_t)number], *known = &roles[role];
-    uint32_t image = has_image ? (uint32_t)from->image : IMP_NOT_YET;
     uint32_t slot = image_slot(context, image, role);
     for (int other = 0; *known == IMP_NOT_YET && other < IMP_ROLES; other++)
         if (roles[other] != IMP_NOT_YET && image_slot(context, image, other) == slot)
@@ -147,7 +165,8 @@ static bool plan_images(struct imp_context *context, struct plan *plans, struct 
         }
         const char *mime = imp_image_mime(imp_image_sniff(image->data));
         if (image->mime[0] && strcasecmp(image->mime, mime) &&
-            strcasecmp(image->mime, "application/octet-stream"))
+            strcasecmp(image->mime, "application/octet-stream") &&
+            (strcasecmp(image->mime, "image/jpg") || strcmp(mime, "image/jpeg")))
             imp_warn(context, "Image %u is said to be %s, but is %s.", number,
                 imp_text(image->mime).s, mime);
         uploaded += (uint64_t)plan->width * plan->height;

@@ -1,5 +1,5 @@
-/* RFC 2397, read kindly: its words in any case, base64 that is wrapped, percent-encoded or of the
- * URL alphabet, and payloads without base64. */
+/* RFC 2397, read kindly: its words in any case, blanks around them, base64 that is wrapped,
+ * percent-encoded or of the URL alphabet, and payloads without base64. */
 #include "protocol/hex.h"
 #include "renderer/import/document/document.h"
 #include <string.h>
@@ -79,20 +79,27 @@ static void trim(char *text)
         text[--bytes] = 0;
 }
 
+bool imp_is_data_uri(const char *uri)
+{
+    return !strncasecmp(uri + strspn(uri, BLANKS), "data:", 5);
+}
+
 bool imp_data_uri_decode(char *uri, const char **mime, struct imp_bytes *payload)
 {
-    if (strncasecmp(uri, "data:", 5))
+    if (!imp_is_data_uri(uri))
         return false;
+    uri += strspn(uri, BLANKS);
     char *comma = strchr(uri, ',');
     if (!comma)
         return false;
     *comma = 0;
+    uri[percent_decode((uint8_t *)uri, strlen(uri))] = 0;
     trim(uri); /* blanks may stand around the marker */
     char *marker = strrchr(uri, ';');
     bool base64 = marker && !strcasecmp(marker + 1 + strspn(marker + 1, BLANKS), "base64");
     uri[strcspn(uri, ";")] = 0;
     trim(uri);
-    *mime = uri + 5;
+    *mime = uri + 5 + strspn(uri + 5, BLANKS);
     uint8_t *data = (uint8_t *)comma + 1;
     size_t bytes = percent_decode(data, strlen(comma + 1));
     if (base64 && !base64_decode(data, &bytes))

@@ -8,13 +8,11 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
 
 #define GLB_JSON 0x4e4f534au
 #define GLB_BIN 0x004e4942u
 
-#define CONVERT_OLD                                                                                \
-    "A tool such as gltf-pipeline (gltf-pipeline -i old.gltf -o new.glb) converts files of 1.0."
+#define MOST_WARNINGS 4 /* of a kind */
 
 static uint32_t u32(const uint8_t *p)
 {
@@ -29,10 +27,11 @@ static bool split_glb(const uint8_t *data, size_t bytes, struct imp_bytes *json,
 {
     if (bytes < 20)
         return pen_fail(error, PEN_INVALID, "", "The glTF binary is truncated.");
-    if (u32(data + 4) != 2)
-        return pen_fail(error, PEN_INVALID, "",
-            "The file is glTF binary of version %u; only version 2 can be read. " CONVERT_OLD,
-            u32(data + 4));
+    if (u32(data + 4) != 2) {
+        char what[64];
+        snprintf(what, sizeof what, "glTF binary of version %u", u32(data + 4));
+        return imp_old_version(what, error);
+    }
     size_t length = u32(data + 8);
     if (length > bytes || length < 20)
         return pen_fail(error, PEN_INVALID, "",
@@ -60,7 +59,8 @@ static bool split_glb(const uint8_t *data, size_t bytes, struct imp_bytes *json,
     return true;
 }
 
-static bool parse(struct imp_document *document, struct imp_bytes json, struct pen_error *error)
+static bool parse(struct imp_document *document, struct imp_bytes json, struct psc_builder *builder,
+    struct pen_error *error)
 {
     const char *text = (const char *)json.data, *end = NULL;
     if (json.bytes > IMP_MAX_JSON_BYTES)
@@ -75,22 +75,15 @@ static bool parse(struct imp_document *document, struct imp_bytes json, struct p
     for (; end < text + json.bytes; end++)
         if (!strchr(" \t\r\n", *end))
             return pen_fail(error, PEN_INVALID, "", "The glTF's JSON is followed by something.");
-
-    const cJSON *asset = cJSON_GetObjectItemCaseSensitive(document->root, "asset");
-    const char *version = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(asset, "version"));
-    const char *least = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(asset, "minVersion"));
-    if (version && (strncmp(version, "2.", 2) || (least && strcmp(least, "2.0"))))
-        return pen_fail(error, PEN_INVALID, "/asset/version",
-            "The file is glTF %s; only 2.0 can be read. " CONVERT_OLD,
-            imp_text(least ? least : version).s);
-    return imp_schema_check(document->root, error);
+    return imp_repair_version(document->root, builder, error) &&
+           imp_schema_check(document->root, builder, error);
 }
 
 /* The bytes behind a uri: a data URI, decoded in place, or an uploaded file. */
 static bool fetch(cJSON *uri, struct imp_files *files, const char *name, const char *pointer,
     const char **mime, struct imp_bytes *found, struct pen_error *error)
 {
-    if (strncasecmp(uri->valuestring, "data:", 5))
+    if (!imp_is_data_uri(uri->valuestring))
         return imp_files_resolve(files, name, uri->valuestring, pointer, found, error);
     if (imp_data_uri_decode(uri->valuestring, mime, found))
         return true;
@@ -98,12 +91,12 @@ static bool fetch(cJSON *uri, struct imp_files *files, const char *name, const c
 }
 
 static bool open_buffers(struct imp_document *document, struct imp_bytes bin,
-    struct imp_files *files, const char *name, struct pen_error *error)
+    struct imp_files *files, const char *name, struct psc_builder *builder, struct pen_error *error)
 {
     const cJSON *items = cJSON_GetObjectItemCaseSensitive(document->root, "buffers"), *item;
     document->buffer_count = (uint32_t)cJSON_GetArraySize(items);
     document->buffers = pen_alloc_zero(document->buffer_count, sizeof *document->buffers);
-    uint32_t i = 0;
+    uint32_t i = 0, warned = 0;
     cJSON_ArrayForEach(item, items)
     {
         struct imp_bytes *buffer = &document->buffers[i];
@@ -116,40 +109,15 @@ static bool open_buffers(struct imp_document *document, struct imp_bytes bin,
         if (!uri && i == 0)
             *buffer = bin;
         size_t told = (size_t)cJSON_GetObjectItemCaseSensitive(item, "byteLength")->valuedouble;
-        if (buffer->data && told > buffer->bytes)
-            return pen_fail(error, PEN_INVALID, pointer,
-                "glTF %s: byteLength is %zu, but there are only %zu bytes.", pointer, told,
-                buffer->bytes);
-        if (buffer->data)
+        if (buffer->data && told > buffer->bytes && warned++ < MOST_WARNINGS)
+            psc_builder_add_warning(builder,
+                "Buffer %u has %zu bytes, %zu less than the glTF says.", i, buffer->bytes,
+                told - buffer->bytes);
+        if (buffer->data && told < buffer->bytes)
             buffer->bytes = told;
         i++;
     }
     return true;
-}
-
-/* What the specification forbids, but can only be meant in one way. */
-static void warn_of_views(const cJSON *items, struct psc_builder *builder)
-{
-    const cJSON *item;
-    uint32_t i = 0, odd = UINT32_MAX, empty = UINT32_MAX;
-    cJSON_ArrayForEach(item, items)
-    {
-        const cJSON *stride = cJSON_GetObjectItemCaseSensitive(item, "byteStride");
-        const cJSON *bytes = cJSON_GetObjectItemCaseSensitive(item, "byteLength");
-        uint32_t step = stride ? (uint32_t)stride->valuedouble : 4;
-        if (odd == UINT32_MAX && (step % 4 || step > 252 || !step))
-            odd = i;
-        if (empty == UINT32_MAX && bytes->valuedouble < 1)
-            empty = i;
-        i++;
-    }
-    if (odd != UINT32_MAX)
-        psc_builder_add_warning(builder,
-            "The byteStride of bufferView %u is not a multiple of 4 from 4 to 252, as glTF wants; "
-            "it is used as it is.",
-            odd);
-    if (empty != UINT32_MAX)
-        psc_builder_add_warning(builder, "BufferView %u is empty.", empty);
 }
 
 static bool open_views(
@@ -158,8 +126,8 @@ static bool open_views(
     const cJSON *items = cJSON_GetObjectItemCaseSensitive(document->root, "bufferViews"), *item;
     document->view_count = (uint32_t)cJSON_GetArraySize(items);
     document->views = pen_alloc_zero(document->view_count, sizeof *document->views);
-    uint32_t i = 0;
-    warn_of_views(items, builder);
+    uint32_t i = 0, warned = 0;
+    imp_repair_views(document->root, builder);
     cJSON_ArrayForEach(item, items)
     {
         struct imp_view *view = &document->views[i];
@@ -177,9 +145,14 @@ static bool open_views(
         if (!buffer.data && bytes)
             return pen_fail(error, PEN_INVALID, pointer,
                 "glTF %s: its buffer has neither a uri nor a binary chunk.", pointer);
-        if (first > buffer.bytes || bytes > buffer.bytes - first)
+        if (first > buffer.bytes)
             return pen_fail(error, PEN_INVALID, pointer,
-                "glTF %s: it reaches beyond its buffer of %zu bytes.", pointer, buffer.bytes);
+                "glTF %s: it lies beyond its buffer of %zu bytes.", pointer, buffer.bytes);
+        /* What is used of it may be there all the same: its accessors know. */
+        if (bytes > buffer.bytes - first && warned++ < MOST_WARNINGS)
+            psc_builder_add_warning(builder,
+                "BufferView %u reaches beyond its buffer of %zu bytes.", i - 1, buffer.bytes);
+        bytes = bytes < buffer.bytes - first ? bytes : buffer.bytes - first;
         static const uint8_t nothing;
         *view = (struct imp_view){buffer.data ? buffer.data + first : &nothing, bytes,
             stride ? (uint32_t)stride->valuedouble : 0};
@@ -249,10 +222,13 @@ bool imp_document_open(struct imp_document *document, const uint8_t *data, size_
     struct imp_bytes json = {data, bytes}, bin = {NULL, 0};
     if (bytes >= 4 && !memcmp(data, "glTF", 4) && !split_glb(data, bytes, &json, &bin, error))
         return false;
-    if (!parse(document, json, error) || !imp_extensions_check(document->root, builder, error) ||
-        !open_buffers(document, bin, files, name, error) || !open_views(document, builder, error) ||
-        !imp_document_unpack_draco(document, error) || !open_images(document, files, name, error))
+    if (!parse(document, json, builder, error) ||
+        !imp_extensions_check(document->root, builder, error) ||
+        !open_buffers(document, bin, files, name, builder, error) ||
+        !open_views(document, builder, error) || !imp_document_unpack_draco(document, error) ||
+        !open_images(document, files, name, error))
         goto fail;
+    imp_repair_indices(document, builder);
     render_rest(document);
     return true;
 fail:

@@ -8,7 +8,7 @@ struct cJSON;
 struct psc_builder;
 
 struct imp_view {
-    const uint8_t *data;
+    const uint8_t *data; /* NULL: zeros, as many as are asked for */
     size_t bytes;
     uint32_t stride; /* 0: tightly packed */
 };
@@ -46,6 +46,12 @@ const struct cJSON *imp_meshopt_of(const struct cJSON *view);
 /* Unpacks the views that carry it into document->views. */
 bool imp_document_unpack_views(struct imp_document *document, struct pen_error *error);
 
+/* repair.c: what is plain, though the specification forbids it, with a warning. */
+bool imp_repair_version(struct cJSON *root, struct psc_builder *builder, struct pen_error *error);
+bool imp_old_version(const char *what, struct pen_error *error); /* fails: `what` is too old */
+void imp_repair_views(const struct cJSON *root, struct psc_builder *builder);
+void imp_repair_indices(struct imp_document *document, struct psc_builder *builder);
+
 /* draco.c: makes ordinary primitives of those that carry KHR_draco_mesh_compression. */
 bool imp_document_unpack_draco(struct imp_document *document, struct pen_error *error);
 
@@ -56,4 +62,5 @@ bool imp_extensions_check(
 
 /* data_uri.c: decodes the payload of "data:<mime>;base64,<payload>" in place; *mime is the
  * part before ';', cut out of `uri` in place. False when `uri` is something else or damaged. */
+bool imp_is_data_uri(const char *uri);
 bool imp_data_uri_decode(char *uri, const char **mime, struct imp_bytes *payload);

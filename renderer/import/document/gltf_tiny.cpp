@@ -287,9 +287,12 @@ gltf_material convert(const tinygltf::Material &from)
 
 gltf_texture convert(const tinygltf::Texture &from)
 {
-    gltf_texture to = {from.source, from.sampler};
-    if (const tinygltf::Value *webp = find(from.extensions, "EXT_texture_webp"))
-        to.image = integer(*webp, "source", to.image);
+    static const char *const extensions[] = {
+        "EXT_texture_webp", "EXT_texture_avif", "KHR_texture_basisu", "MSFT_texture_dds"};
+    gltf_texture to = {{-1, -1, -1, -1, from.source}, from.sampler};
+    for (size_t i = 0; i < GLTF_TEXTURE_SOURCES - 1; i++)
+        if (const tinygltf::Value *extension = find(from.extensions, extensions[i]))
+            to.images[i] = integer(*extension, "source", -1);
     return to;
 }
 

@@ -69,9 +69,11 @@ struct gltf_material {
     struct gltf_texture_info base, surface, normal, occlusion, emission;
 };
 
+#define GLTF_TEXTURE_SOURCES 5
+
 struct gltf_texture {
-    int32_t image,
-        sampler; /* image: the WebP source when there is one; -1: none that can be read */
+    int32_t images[GLTF_TEXTURE_SOURCES]; /* the best first, the plain source last; -1: none */
+    int32_t sampler;
 };
 
 struct gltf_sampler {

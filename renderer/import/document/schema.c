@@ -1,4 +1,5 @@
 #include "renderer/import/document/schema.h"
+#include "renderer/blob/builder.h"
 #include "renderer/import/document/schema_table.h"
 #include "renderer/import/base/text.h"
 #include <cjson/cJSON.h>
@@ -17,8 +18,12 @@ struct step {
 struct walk {
     double counts[SCHEMA_ARRAYS]; /* length of each array that an index can point into */
     const struct step *at;
+    struct psc_builder *builder;
+    uint32_t warned;
     struct pen_error *error;
 };
+
+#define MOST_WARNINGS 8
 
 static size_t write_pointer(const struct step *step, char pointer[128])
 {
@@ -120,6 +125,22 @@ static bool check_value(struct walk *walk, cJSON *value, const struct field *fie
     return false;
 }
 
+/* True when the member can only mean that there is none: it is then left out. */
+static bool is_nothing(struct walk *walk, const cJSON *value, const struct field *field)
+{
+    double x = cJSON_IsNumber(value) ? value->valuedouble : 0;
+    bool none = field->kind == INDEX && !field->required && x == -1;
+    bool strange =
+        field->dispensable && cJSON_IsNumber(value) && !(x >= field->min && x <= field->max);
+    char pointer[128];
+    if ((none || strange) && walk->warned++ < MOST_WARNINGS) {
+        write_pointer(walk->at, pointer);
+        psc_builder_add_warning(walk->builder, "glTF %s: %.9g %s.", pointer, x,
+            none ? "is taken for none" : "is no mode of a sampler and is passed over");
+    }
+    return none || strange || cJSON_IsNull(value);
+}
+
 static bool check_object(struct walk *walk, cJSON *object, const struct schema *schema)
 {
     if (!cJSON_IsObject(object))
@@ -138,12 +159,16 @@ static bool check_object(struct walk *walk, cJSON *object, const struct schema *
         struct step step = {walk->at, field->key, 0};
         walk->at = &step;
         /* Two parsers may prefer different ones, and then one of them was never checked. */
-        bool fine =
-            seen >> i & 1 ? bad(walk, "stands there twice") : check_value(walk, item, field);
-        seen |= 1u << i;
+        bool nothing = is_nothing(walk, item, field);
+        bool fine = nothing         ? true
+                    : seen >> i & 1 ? bad(walk, "stands there twice")
+                                    : check_value(walk, item, field);
+        seen |= nothing ? 0 : 1u << i;
         walk->at = step.up;
         if (!fine)
             return false;
+        if (nothing)
+            cJSON_Delete(cJSON_DetachItemViaPointer(object, item));
     }
     for (uint32_t i = 0; i < schema->count; i++)
         if (schema->fields[i].required && !(seen >> i & 1)) {
@@ -161,9 +186,9 @@ static const cJSON *descend(const cJSON *root, const char *a, const char *b)
     return cJSON_GetObjectItemCaseSensitive(cJSON_GetObjectItemCaseSensitive(root, a), b);
 }
 
-bool imp_schema_check(cJSON *root, struct pen_error *error)
+bool imp_schema_check(cJSON *root, struct psc_builder *builder, struct pen_error *error)
 {
-    struct walk walk = {.error = error};
+    struct walk walk = {.builder = builder, .error = error};
     if (!cJSON_IsObject(root))
         return bad(&walk, "must be an object");
     const cJSON *extensions = cJSON_GetObjectItemCaseSensitive(root, "extensions");

@@ -55,7 +55,7 @@ SCHEMA(sparse_values,
     {"bufferView", INDEX, .required = true, .into = IN_VIEWS},
     {"byteOffset", UINT});
 SCHEMA(sparse,
-    {"count", UINT, .required = true, .min = 1},
+    {"count", UINT, .required = true},
     {"indices", OBJECT, .required = true, .schema = &sparse_indices},
     {"values", OBJECT, .required = true, .schema = &sparse_values});
 SCHEMA(accessor,
@@ -151,18 +151,20 @@ SCHEMA(material,
 
 SCHEMA(texture_source, {"source", INDEX, .into = IN_IMAGES});
 SCHEMA(texture_extensions,
+    OBJ("EXT_texture_avif", texture_source),
     OBJ("EXT_texture_webp", texture_source),
-    OBJ("KHR_texture_basisu", texture_source));
+    OBJ("KHR_texture_basisu", texture_source),
+    OBJ("MSFT_texture_dds", texture_source));
 SCHEMA(texture,
     {"sampler", INDEX, .into = IN_SAMPLERS},
     {"source", INDEX, .into = IN_IMAGES},
     OBJ("extensions", texture_extensions));
 SCHEMA(image, {"uri", STRING}, {"mimeType", STRING}, {"bufferView", INDEX, .into = IN_VIEWS});
 SCHEMA(sampler,
-    {"magFilter", UINT, .min = 9728, .max = 9729},
-    {"minFilter", UINT, .min = 9728, .max = 9987},
-    {"wrapS", UINT, .min = 10497, .max = 33648},
-    {"wrapT", UINT, .min = 10497, .max = 33648});
+    {"magFilter", UINT, .dispensable = true, .min = 9728, .max = 9729},
+    {"minFilter", UINT, .dispensable = true, .min = 9728, .max = 9987},
+    {"wrapS", UINT, .dispensable = true, .min = 10497, .max = 33648},
+    {"wrapT", UINT, .dispensable = true, .min = 10497, .max = 33648});
 
 SCHEMA(perspective,
     {"yfov", NUMBER, .required = true},

@@ -37,6 +37,7 @@ struct field {
     const char *key;
     enum field_kind kind;
     bool required;
+    bool dispensable; /* a value out of range is passed over */
     enum schema_array_id into;
     uint32_t min, max;
     const struct schema *schema;

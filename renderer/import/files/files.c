@@ -1,4 +1,5 @@
 #include "renderer/import/files/files.h"
+#include "renderer/import/files/foreign.h"
 #include "protocol/memory.h"
 #include "renderer/import/base/budget.h"
 #include "renderer/import/base/text.h"
@@ -162,11 +163,16 @@ static bool has_suffix(const char *name, const char *suffix)
     return n > s && !strcasecmp(name + n - s, suffix);
 }
 
+/* What archivers leave behind. */
+static bool is_litter(const char *name)
+{
+    return !strncmp(name, "__MACOSX/", 9) || last_part(name)[0] == '.';
+}
+
 static bool is_scene(const struct imp_file *file)
 {
     return (has_suffix(file->name, ".gltf") || has_suffix(file->name, ".glb")) &&
-           strncmp(file->name, "__MACOSX/", 9) &&
-           last_part(file->name)[0] != '.'; /* what archivers leave behind */
+           !is_litter(file->name);
 }
 
 static uint32_t depth_of(const char *name)
@@ -210,6 +216,23 @@ static const struct imp_file *named_document(
     return NULL;
 }
 
+/* Says what is there instead, when it is something else that has a shape. */
+static const struct imp_file *no_document(const struct imp_files *files, struct pen_error *error)
+{
+    const char *why = NULL;
+    uint32_t i = 0;
+    while (i < files->count &&
+           !(why = is_litter(files->items[i].name) ? NULL : imp_foreign_name(files->items[i].name)))
+        i++;
+    if (why)
+        pen_fail(error, PEN_INVALID, "",
+            "There is no .glb or .gltf among the files, but there is \"%s\". %s",
+            imp_text(files->items[i].name).s, why);
+    else
+        pen_fail(error, PEN_INVALID, "", "There is no .glb or .gltf among the files.");
+    return NULL;
+}
+
 const struct imp_file *imp_files_document(
     struct imp_files *files, const char *entry, bool *others, struct pen_error *error)
 {
@@ -234,7 +257,7 @@ const struct imp_file *imp_files_document(
     char list[400];
     *others = count > 1;
     if (!best)
-        pen_fail(error, PEN_INVALID, "", "There is no .glb or .gltf among the files.");
+        return no_document(files, error);
     if (level < 2)
         return best;
     list_scenes(files, best_depth, false, list, sizeof list);

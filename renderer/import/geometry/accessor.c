@@ -97,16 +97,17 @@ bool imp_reader_init(struct imp_reader *reader, const struct imp_document *docum
             return pen_fail(
                 error, PEN_INVALID, pointer, "glTF %s: its bufferView does not exist.", pointer);
         const struct imp_view *view = &document->views[accessor->view];
-        if (view->stride)
+        if (view->data && view->stride)
             reader->stride = view->stride;
         if (reader->stride < element_bytes)
             return pen_fail(error, PEN_INVALID, pointer,
                 "glTF %s: its elements have %u bytes, but byteStride is %zu.", pointer,
                 element_bytes, reader->stride);
-        if (!fits(view, accessor->offset, accessor->count, reader->stride, element_bytes))
+        if (view->data &&
+            !fits(view, accessor->offset, accessor->count, reader->stride, element_bytes))
             return pen_fail(
                 error, PEN_INVALID, pointer, "glTF %s: it reaches beyond its bufferView.", pointer);
-        reader->data = view->data + accessor->offset;
+        reader->data = view->data ? view->data + accessor->offset : NULL;
     }
     if (accessor->sparse &&
         (!init_sparse(reader, document, accessor, element_bytes) || !sparse_increases(reader)))

@@ -1,10 +1,10 @@
 #include "renderer/renderer.h"
 #include "protocol/memory.h"
-#include "renderer/frame/frame.h"
+#include "renderer/lane.h"
 #include "renderer/generate/generate.h"
 #include "renderer/gl/context.h"
-#include "renderer/passes/draw/passes.h"
 #include "renderer/passes/map/shadow_cache.h"
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -27,17 +27,21 @@ enum {
 #define MAX_RESIDENT 256
 #define EMISSION_BYTES (64u << 20) /* kept emission textures; they are cheap to make again */
 
+struct pen_render {
+    struct pen_renderer *renderer;
+    struct lane lane;
+};
+
 struct pen_renderer {
     struct gl_context *context;
     struct pen_device_info device;
-    struct technique_ctx ctx;
-    struct frame_targets targets;
+    struct technique_ctx ctx; /* what lanes share */
+    struct pen_render renders[PEN_MAX_RENDERS];
     uint64_t budget, clock;
     bool lost;
     struct scene *scenes[MAX_RESIDENT]; /* emission images too: scenes without geometry */
     uint32_t scene_count;
     struct emission_cache *emissions;
-    void *states[TECHNIQUE_COUNT];
 };
 
 const struct pen_catalogue *pen_renderer_catalogue(void)
@@ -64,25 +68,19 @@ struct pen_renderer *pen_renderer_create(
     r->ctx.gpu_memory = r->budget;
     r->ctx.shadow_memory = r->budget / 2;
     r->ctx.software = r->device.software;
-    r->ctx.passes = passes_create();
     r->ctx.programs = gl_programs_create(config->programs);
     r->ctx.shadows = shadow_cache_create();
     r->emissions = emission_cache_create();
     gl_samplers_init(&r->ctx.samplers);
-    gl_timer_init(&r->ctx.timer, r->device.software);
     gl.CreateVertexArrays(1, &r->ctx.empty_array);
-    gl.CreateBuffers(1, &r->ctx.light_block);
-    gl.CreateBuffers(1, &r->ctx.param_block);
     r->ctx.white = gl_texture_create(GL_RGBA8, 1, 1, 0, 1);
     static const uint8_t white[4] = {255, 255, 255, 255};
     gl.TextureSubImage2D(r->ctx.white.name, 0, 0, 0, 1, 1, GL_RGBA, GL_UNSIGNED_BYTE, white);
-    for (uint32_t i = 0; i < TECHNIQUE_COUNT; i++) {
-        const struct technique *t = technique_registry[i];
-        r->states[i] = pen_alloc_zero(1, t->state_size);
-        if (t->create && !t->create(&r->ctx, r->states[i], error)) {
-            pen_renderer_destroy(r);
-            return NULL;
-        }
+    for (uint32_t i = 0; i < PEN_MAX_RENDERS; i++)
+        r->renders[i].renderer = r;
+    if (!lane_make(&r->renders[0].lane, &r->ctx, 0, error)) {
+        pen_renderer_destroy(r);
+        return NULL;
     }
     return r;
 }
@@ -91,23 +89,15 @@ void pen_renderer_destroy(struct pen_renderer *r)
 {
     if (!r)
         return;
-    for (uint32_t i = 0; i < TECHNIQUE_COUNT; i++) {
-        if (r->states[i] && technique_registry[i]->destroy)
-            technique_registry[i]->destroy(&r->ctx, r->states[i]);
-        free(r->states[i]);
-    }
+    for (uint32_t i = 0; i < PEN_MAX_RENDERS; i++)
+        lane_finish(&r->renders[i].lane);
     for (uint32_t i = 0; i < r->scene_count; i++)
         scene_destroy(r->scenes[i]);
-    frame_targets_finish(&r->targets);
-    passes_destroy(r->ctx.passes);
     shadow_cache_destroy(r->ctx.shadows);
     emission_cache_destroy(r->emissions);
-    gl_timer_finish(&r->ctx.timer);
     gl_samplers_finish(&r->ctx.samplers);
     gl_programs_destroy(r->ctx.programs);
     gl_texture_destroy(&r->ctx.white);
-    GLuint buffers[] = {r->ctx.light_block, r->ctx.param_block};
-    gl.DeleteBuffers(2, buffers);
     gl.DeleteVertexArrays(1, &r->ctx.empty_array);
     gl_context_destroy(r->context);
     free(r);
@@ -144,6 +134,24 @@ struct pen_program_counts pen_renderer_programs(const struct pen_renderer *r)
     return gl_programs_counts(r->ctx.programs);
 }
 
+/* A frame in progress reads it. */
+static bool is_used(const struct pen_renderer *r, const struct scene *scene)
+{
+    for (uint32_t i = 0; i < PEN_MAX_RENDERS; i++) {
+        const struct lane *lane = &r->renders[i].lane;
+        if (!lane->busy)
+            continue;
+        const struct pen_request *request = &lane->result->completed;
+        if (lane->job.scene == scene)
+            return true;
+        for (uint32_t k = 0; k < request->light_count; k++)
+            if (request->lights[k].texture == PEN_TEXTURE_IMAGE &&
+                !memcmp(request->lights[k].image, scene->id, PEN_ID_BYTES))
+                return true;
+    }
+    return false;
+}
+
 static void remove_scene(struct pen_renderer *r, uint32_t i)
 {
     shadow_cache_drop_scene(r->ctx.shadows, r->scenes[i]);
@@ -155,8 +163,6 @@ static void remove_scene(struct pen_renderer *r, uint32_t i)
 /* Frees least recently used scenes, never `keep`, until the budget holds. */
 static void evict(struct pen_renderer *r, const struct scene *keep)
 {
-    /* Called between frames: what the last one used may go too. */
-    shadow_cache_begin_frame(r->ctx.shadows);
     for (;;) {
         uint64_t scenes = scene_bytes(r), least = UINT64_MAX;
         /* Shadow inputs are cheaper to make again than scenes are to upload. */
@@ -165,7 +171,7 @@ static void evict(struct pen_renderer *r, const struct scene *keep)
             return;
         uint32_t oldest = UINT32_MAX;
         for (uint32_t i = 0; i < r->scene_count; i++)
-            if (r->scenes[i] != keep && r->scenes[i]->last_use < least)
+            if (r->scenes[i] != keep && r->scenes[i]->last_use < least && !is_used(r, r->scenes[i]))
                 least = r->scenes[i]->last_use, oldest = i;
         if (oldest == UINT32_MAX)
             return;
@@ -188,7 +194,6 @@ static bool load(struct pen_renderer *r, const uint8_t id[PEN_ID_BYTES], struct 
     }
     scene->last_use = ++r->clock;
     r->scenes[r->scene_count++] = scene;
-    shadow_cache_begin_frame(r->ctx.shadows);
     evict(r, scene);
     return true;
 }
@@ -208,7 +213,10 @@ void pen_renderer_drop_scene(struct pen_renderer *r, const uint8_t id[PEN_ID_BYT
 {
     for (uint32_t i = 0; i < r->scene_count; i++)
         if (!memcmp(r->scenes[i]->id, id, PEN_ID_BYTES)) {
-            remove_scene(r, i);
+            if (is_used(r, r->scenes[i]))
+                r->scenes[i]->last_use = 0; /* the first to be evicted */
+            else
+                remove_scene(r, i);
             return;
         }
 }
@@ -233,7 +241,34 @@ static const struct scene *find_image(void *owner, const struct pen_light *light
     return scene;
 }
 
-bool pen_renderer_render(struct pen_renderer *r, const struct pen_request *request,
+/* The scene cannot be in two poses at a time. */
+static bool can_pose(struct pen_renderer *r, struct scene *scene, const struct pen_request *request)
+{
+    for (uint32_t i = 0; i < PEN_MAX_RENDERS; i++) {
+        const struct lane *lane = &r->renders[i].lane;
+        const struct pen_request *other = lane->busy ? &lane->result->completed : NULL;
+        if (other && lane->job.scene == scene &&
+            (strcmp(other->animation, request->animation) || other->time_s != request->time_s))
+            return false;
+    }
+    return true;
+}
+
+static struct pen_render *free_render(struct pen_renderer *r)
+{
+    for (uint32_t i = 0; i < PEN_MAX_RENDERS; i++)
+        if (!r->renders[i].lane.busy)
+            return &r->renders[i];
+    return NULL;
+}
+
+bool pen_renderer_can_begin(struct pen_renderer *r, const struct pen_request *request)
+{
+    struct scene *scene = find_scene(r, request->scene);
+    return free_render(r) && (!scene || can_pose(r, scene, request));
+}
+
+struct pen_render *pen_render_begin(struct pen_renderer *r, const struct pen_request *request,
     struct pen_frame *frame, struct pen_result *result, struct pen_error *error)
 {
     memset(result, 0, sizeof *result);
@@ -241,10 +276,12 @@ bool pen_renderer_render(struct pen_renderer *r, const struct pen_request *reque
     result->completed = *request;
     result->device = r->device;
     struct scene *scene = find_scene(r, request->scene);
+    struct pen_render *render = free_render(r);
     if (!pen_request_check(request, pen_renderer_catalogue(), error))
         goto fail;
-    if (!scene) {
-        pen_fail(error, PEN_INTERNAL, "", "The scene is not resident.");
+    if (!scene || !render || !can_pose(r, scene, request)) {
+        pen_fail(error, PEN_INTERNAL, "",
+            scene ? "Too much is in progress." : "The scene is not resident.");
         goto fail;
     }
     uint32_t t = 0;
@@ -253,38 +290,85 @@ bool pen_renderer_render(struct pen_renderer *r, const struct pen_request *reque
     scene->last_use = ++r->clock;
     if (!scene_set_pose(scene, request->animation, request->time_s, error))
         goto fail;
-    struct frame_job job = {.ctx = &r->ctx,
-        .targets = &r->targets,
+    struct lane *lane = &render->lane;
+    if (!lane_make(lane, &r->ctx, (uint32_t)(render - r->renders), error))
+        goto fail;
+    lane->job = (struct frame_job){.ctx = &lane->ctx,
+        .targets = &lane->targets,
         .scene = scene,
         .request = &result->completed,
         .technique = technique_registry[t],
-        .technique_state = r->states[t],
+        .technique_state = lane->states[t],
         .emissions = r->emissions,
         .find_image = find_image,
         .owner = r};
-    bool ok = frame_render(&job, frame, result, error);
-    evict(r, scene);
-    emission_cache_trim(r->emissions, EMISSION_BYTES);
-    gl_programs_end_frame(r->ctx.programs);
-    result->gpu_bytes = pen_renderer_gpu_bytes(r);
-    result->programs = gl_programs_counts(r->ctx.programs);
-    GLenum gl_error = gl.GetError();
-    if (ok && gl_error == GL_NO_ERROR)
-        return true;
-    if (gl_error == GL_CONTEXT_LOST || gl_error == GL_OUT_OF_MEMORY)
-        r->lost = true;
-    if (ok)
-        pen_fail(error, PEN_INTERNAL, "", "OpenGL reported error 0x%04x.", gl_error);
-    pen_frame_finish(frame);
+    lane_begin(lane, frame, result);
+    return render;
 fail:
     if (error)
         result->error = *error;
+    return NULL;
+}
+
+bool pen_render_advance(struct pen_render *render, double ms)
+{
+    return lane_advance(&render->lane, ms);
+}
+
+bool pen_render_end(struct pen_render *render, struct pen_error *error)
+{
+    struct pen_renderer *r = render->renderer;
+    struct lane *lane = &render->lane;
+    struct pen_result *result = lane->result;
+    bool cancelled = !lane->ended;
+    if (cancelled)
+        lane_cancel(lane);
+    if (cancelled || lane->error.code == PEN_LOST)
+        lane->ok = false;
+    lane->busy = false;
+    shadow_cache_end_frame(&lane->ctx);
+    uint64_t since = UINT64_MAX;
+    bool alone = true;
+    for (uint32_t i = 0; i < PEN_MAX_RENDERS; i++) {
+        const struct lane *other = &r->renders[i].lane;
+        alone = alone && !other->busy;
+        if (other->busy && other->programs_since < since)
+            since = other->programs_since;
+    }
+    evict(r, lane->job.scene);
+    if (alone)
+        emission_cache_trim(r->emissions, EMISSION_BYTES);
+    gl_programs_end_frame(
+        r->ctx.programs, since < lane->programs_since ? since : lane->programs_since);
+    result->gpu_bytes = pen_renderer_gpu_bytes(r);
+    result->programs = gl_programs_counts(r->ctx.programs);
+    GLenum gl_error = gl.GetError();
+    if (lane->ok && gl_error == GL_NO_ERROR)
+        return true;
+    if (gl_error == GL_CONTEXT_LOST || gl_error == GL_OUT_OF_MEMORY)
+        r->lost = true;
+    if (lane->ok)
+        pen_fail(&lane->error, PEN_INTERNAL, "", "OpenGL reported error 0x%04x.", gl_error);
+    pen_frame_finish(lane->frame);
+    result->error = lane->error;
+    if (error)
+        *error = lane->error;
     return false;
+}
+
+bool pen_renderer_render(struct pen_renderer *r, const struct pen_request *request,
+    struct pen_frame *frame, struct pen_result *result, struct pen_error *error)
+{
+    struct pen_render *render = pen_render_begin(r, request, frame, result, error);
+    if (!render)
+        return false;
+    while (!pen_render_advance(render, INFINITY))
+        ;
+    return pen_render_end(render, error);
 }
 
 void pen_renderer_drop_shadows(struct pen_renderer *r)
 {
-    shadow_cache_begin_frame(r->ctx.shadows); /* the last frame's inputs may go too */
     shadow_cache_trim(r->ctx.shadows, 0);
 }
 

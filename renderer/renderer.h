@@ -42,6 +42,20 @@ bool pen_renderer_has_image(const struct pen_renderer *renderer, const uint8_t i
  * asks what this scene does not have (camera 7 of 3). PEN_INTERNAL with a lost context: destroy. */
 bool pen_renderer_render(struct pen_renderer *renderer, const struct pen_request *request,
     struct pen_frame *frame, struct pen_result *result, struct pen_error *error);
+/* The same in pieces. Several may be in progress side by side; what is pointed at stays until the
+ * end. `frame` and `result` are filled at the end. */
+#define PEN_MAX_RENDERS 4
+struct pen_render;
+/* There is room for it, and its scene is in use in no other pose. */
+bool pen_renderer_can_begin(struct pen_renderer *renderer, const struct pen_request *request);
+/* NULL, with the error filled, when it cannot even begin. */
+struct pen_render *pen_render_begin(struct pen_renderer *renderer,
+    const struct pen_request *request, struct pen_frame *frame, struct pen_result *result,
+    struct pen_error *error);
+/* Goes on for about so many ms, more where a piece cannot be cut. True when it has ended. */
+bool pen_render_advance(struct pen_render *render, double ms);
+/* As pen_renderer_render; one that has not ended gives up at once and fails with PEN_LOST. */
+bool pen_render_end(struct pen_render *render, struct pen_error *error);
 /* Forgets every shadow input, so that the next render pays for its own. */
 void pen_renderer_drop_shadows(struct pen_renderer *renderer);
 /* True when the GL context was lost; the worker then exits and is replaced. */

@@ -6,6 +6,7 @@
 #pragma once
 #include "protocol/result.h"
 #include "protocol/technique_info.h"
+#include "renderer/gl/fiber.h"
 #include "renderer/gl/program.h"
 #include "renderer/gl/target.h"
 #include "renderer/gl/timer.h"
@@ -16,20 +17,36 @@
 struct passes;
 struct shadow_cache;
 
-/* Per renderer: lives as long as the context. */
+/* A frame in progress gives way to others between two pieces of work (passes/draw/turn.h). */
+struct technique_turns {
+    struct gl_fiber *fiber; /* NULL: it never does */
+    double most_ms;         /* a turn should last at most so long */
+    double since_ms;        /* when this one began; gl_now_ms */
+    uint32_t number;
+    bool cancelled;
+    bool held;    /* what is under way must not be interrupted */
+    GLsync fence; /* of the last piece but one */
+};
+
+/* What a frame in progress has for itself, and what all of them share. There are as many as frames
+ * that may be in progress side by side (renderer/lane.h), and they live as long as the context. */
 struct technique_ctx {
+    struct technique_turns turns;
+    uint32_t lane; /* number of this one */
     struct gl_programs *programs;
     struct gl_samplers samplers;
     struct gl_timer timer;
-    struct shadow_cache *shadows;    /* inputs that are kept between requests */
-    struct passes *passes;           /* what passes keep for themselves */
-    bool software;                   /* OpenGL runs on the CPU */
-    GLuint empty_array;              /* vertex array for passes that make their own vertices */
-    GLuint light_block, param_block; /* uniform buffers, UBO_LIGHT and UBO_PARAMS */
-    struct gl_texture white;         /* 1 x 1, bound where a light has no emission texture */
-    uint64_t gpu_memory;             /* the budget of everything, bytes */
-    uint64_t shadow_memory; /* bytes that kept shadow inputs of a frame may take together */
-    uint64_t shadow_budget; /* the share of one face of one light in it; set for every frame */
+    struct shadow_cache *shadows; /* inputs that are kept between requests */
+    struct passes *passes;        /* what passes keep for themselves */
+    bool software;                /* OpenGL runs on the CPU */
+    GLuint empty_array;           /* vertex array for passes that make their own vertices */
+    /* Uniform buffers: UBO_VIEW, UBO_LIGHT and UBO_PARAMS. */
+    GLuint view_block, light_block, param_block;
+    GLuint counts;           /* STORAGE_COUNTS of the frame's method, or 0 */
+    struct gl_texture white; /* 1 x 1, bound where a light has no emission texture */
+    uint64_t gpu_memory;     /* the budget of everything, bytes */
+    uint64_t shadow_memory;  /* bytes that kept shadow inputs of a frame may take together */
+    uint64_t shadow_budget;  /* the share of one face of one light in it; set for every frame */
 };
 
 struct gbuffer {

@@ -25,7 +25,6 @@ struct frame {
     struct light lights[PEN_MAX_LIGHTS];
     const struct emission *emissions[PEN_MAX_LIGHTS]; /* NULL: no texture */
     uint32_t light_count;
-    GLuint view_buffer;
     struct pen_result *result;
     uint64_t triangles;
     bool classified; /* at least one light of one frame */
@@ -73,8 +72,8 @@ static void upload_view(struct frame *f, uint32_t number)
     b.display[1] = (float)r->tone_map;
     b.display[2] = (float)number;
     b.display[3] = 1 / (float)r->antialias;
-    gl.NamedBufferData(f->view_buffer, sizeof b, &b, GL_STREAM_DRAW);
-    gl.BindBufferBase(GL_UNIFORM_BUFFER, UBO_VIEW, f->view_buffer);
+    gl.NamedBufferData(f->job->ctx->view_block, sizeof b, &b, GL_STREAM_DRAW);
+    gl.BindBufferBase(GL_UNIFORM_BUFFER, UBO_VIEW, f->job->ctx->view_block);
 }
 
 /* Point `index` of the Halton sequence in bases 2 and 3, centred on 0. */
@@ -310,7 +309,7 @@ bool frame_render(const struct frame_job *job, struct pen_frame *frame, struct p
     bool ok = false;
     memset(frame, 0, sizeof *frame);
     gl_timer_reset(&job->ctx->timer);
-    shadow_cache_begin_frame(job->ctx->shadows);
+    shadow_cache_begin_frame(job->ctx);
     if (!view_resolve(&f.view, &r->camera, job->scene, r->width, r->height, error))
         return false;
     bool own_light = !r->lights_given && !job->scene->blob.light_count;
@@ -324,7 +323,6 @@ bool frame_render(const struct frame_job *job, struct pen_frame *frame, struct p
         return false;
     fit_targets(&f);
     frame_layers_begin(job, result);
-    gl.CreateBuffers(1, &f.view_buffer);
     for (uint32_t i = 0; i < r->antialias; i++) {
         float x = 0, y = 0;
         if (r->antialias > 1) {
@@ -338,13 +336,12 @@ bool frame_render(const struct frame_job *job, struct pen_frame *frame, struct p
         goto done;
     frame_layers_end(job, &f.work, f.classified, result);
     gl_timer_collect(&job->ctx->timer, result);
-    result->shadow_inputs_reused = shadow_cache_all_reused(job->ctx->shadows);
+    result->shadow_inputs_reused = shadow_cache_all_reused(job->ctx);
     result->triangles_drawn = (uint32_t)f.triangles;
     ok = true;
 done:
     if (job->technique->finish)
         job->technique->finish(job->ctx, job->technique_state, result);
-    gl.DeleteBuffers(1, &f.view_buffer);
     gl.DeleteQueries(PEN_MAX_ANTIALIAS, f.work.queries);
     return ok;
 }

@@ -1,6 +1,7 @@
 #include "renderer/frame/layers.h"
 #include "renderer/frame/needs.h"
 #include "renderer/passes/draw/screen.h"
+#include "renderer/passes/draw/turn.h"
 #include "renderer/passes/map/classify.h"
 
 #define SHARED_ROWS "renderer/shaders/frame/classes.def"
@@ -81,7 +82,7 @@ bool frame_layers_count_receivers(
     gl.DepthMask(GL_TRUE);
     gl.Disable(GL_DEPTH_TEST);
     gl_timer_end(&job->ctx->timer);
-    return true;
+    return pass_turn(job->ctx, error);
 }
 
 void frame_layers_end(const struct frame_job *job, const struct frame_work *work, bool classified,

@@ -367,7 +367,12 @@ static void drop(struct gl_programs *programs, uint32_t i)
     *e = programs->entries[--programs->counts.kept];
 }
 
-void gl_programs_end_frame(struct gl_programs *programs)
+uint64_t gl_programs_clock(const struct gl_programs *programs)
+{
+    return programs->clock;
+}
+
+void gl_programs_end_frame(struct gl_programs *programs, uint64_t since)
 {
     struct pen_program_counts *counts = &programs->counts;
     while (counts->kept > programs->most || counts->bytes > MOST_BYTES) {
@@ -375,7 +380,7 @@ void gl_programs_end_frame(struct gl_programs *programs)
         for (uint32_t i = 1; i < counts->kept; i++)
             if (programs->entries[i].last_use < programs->entries[oldest].last_use)
                 oldest = i;
-        if (programs->entries[oldest].last_use == programs->clock)
+        if (programs->entries[oldest].last_use >= since)
             break;
         drop(programs, oldest);
         counts->evicted++;

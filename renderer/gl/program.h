@@ -31,9 +31,11 @@ void gl_programs_destroy(struct gl_programs *programs);
 GLuint gl_programs_get(
     struct gl_programs *programs, const struct gl_program_desc *desc, struct pen_error *error);
 
-/* Nothing holds a name of gl_programs_get any longer. The least recently used programs leave until
- * the limits hold, but never one that this frame has used: the next one is likely to want it. */
-void gl_programs_end_frame(struct gl_programs *programs);
+/* The number of the frame at hand. */
+uint64_t gl_programs_clock(const struct gl_programs *programs);
+/* A frame is done. The least recently used programs leave until the limits hold, but never one that
+ * was used since the clock stood at `since`: frames in progress hold their names. */
+void gl_programs_end_frame(struct gl_programs *programs, uint64_t since);
 struct pen_program_counts gl_programs_counts(const struct gl_programs *programs);
 
 /* The file with its includes replaced, as programs have it, for code that compiles pieces of its

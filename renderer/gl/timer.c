@@ -40,6 +40,7 @@ void gl_timer_begin(struct gl_timer *timer, enum pen_stage stage, const char *na
     uint32_t i = timer->count++;
     snprintf(timer->passes[i].name, sizeof timer->passes[i].name, "%s", name);
     timer->passes[i].stage = stage;
+    timer->passes[i].again = false;
     timer->passes[i].parent = timer->depth ? (int32_t)timer->open[timer->depth - 1] : -1;
     timer->open[timer->depth] = i;
     timer->nested_ms[timer->depth] = 0;
@@ -69,6 +70,45 @@ void gl_timer_end(struct gl_timer *timer)
     timer->passes[i].ms = total - timer->nested_ms[timer->depth];
     if (timer->depth)
         timer->nested_ms[timer->depth - 1] += total;
+}
+
+static uint32_t open_count(const struct gl_timer *timer)
+{
+    return timer->depth < GL_TIMER_DEPTH ? timer->depth : GL_TIMER_DEPTH;
+}
+
+void gl_timer_stop(struct gl_timer *timer)
+{
+    timer->stopped_ms = gl_now_ms();
+    for (uint32_t d = open_count(timer); !timer->software && d-- > 0;)
+        gl.QueryCounter(timer->passes[timer->open[d]].queries[1], GL_TIMESTAMP);
+}
+
+/* A device's time stamps cannot leave anything out, so each open pass goes on as a new entry. */
+static void open_again(struct gl_timer *timer, uint32_t d)
+{
+    uint32_t before = timer->open[d], i = timer->count;
+    if (i == ROOM)
+        return;
+    timer->count++;
+    memcpy(timer->passes[i].name, timer->passes[before].name, sizeof timer->passes[i].name);
+    timer->passes[i].stage = timer->passes[before].stage;
+    timer->passes[i].again = true;
+    timer->passes[i].parent = d ? (int32_t)timer->open[d - 1] : -1;
+    timer->open[d] = i;
+    if (!timer->passes[i].queries[0])
+        gl.CreateQueries(GL_TIMESTAMP, 2, timer->passes[i].queries);
+    gl.QueryCounter(timer->passes[i].queries[0], GL_TIMESTAMP);
+}
+
+void gl_timer_go_on(struct gl_timer *timer)
+{
+    double away = gl_now_ms() - timer->stopped_ms;
+    for (uint32_t d = 0; d < open_count(timer); d++)
+        if (timer->software)
+            timer->begun_ms[d] += away;
+        else
+            open_again(timer, d);
 }
 
 static struct pen_pass_time *find_pass(struct pen_result *result, const char *name, uint32_t stage)
@@ -109,7 +149,7 @@ void gl_timer_collect(struct gl_timer *timer, struct pen_result *result)
         result->stage_ms[stage] += (float)timer->passes[i].ms;
         if (pass) {
             pass->ms += (float)timer->passes[i].ms;
-            pass->count++;
+            pass->count += !timer->passes[i].again;
         }
     }
 }

@@ -11,12 +11,14 @@ struct gl_timer {
     uint32_t count, depth;
     uint32_t open[GL_TIMER_DEPTH]; /* indices of passes that have begun */
     double begun_ms[GL_TIMER_DEPTH], nested_ms[GL_TIMER_DEPTH];
+    double stopped_ms;
     struct {
         char name[24];
         uint32_t stage;
         GLuint queries[2];
         double ms; /* software; exclusive of passes inside it */
         int32_t parent;
+        bool again; /* goes on with an earlier entry */
     } passes[PEN_MAX_PASSES * 8];
 };
 
@@ -28,6 +30,9 @@ void gl_timer_reset(struct gl_timer *timer);
 /* Passes may nest; time spent in an inner pass is not counted in the outer one. */
 void gl_timer_begin(struct gl_timer *timer, enum pen_stage stage, const char *name);
 void gl_timer_end(struct gl_timer *timer);
+/* In between other frames may be drawn; their time does not count. */
+void gl_timer_stop(struct gl_timer *timer);
+void gl_timer_go_on(struct gl_timer *timer);
 /* Waits for the results and adds them up by name into result->passes and result->stage_ms. */
 void gl_timer_collect(struct gl_timer *timer, struct pen_result *result);
 

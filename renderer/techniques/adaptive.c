@@ -1,3 +1,4 @@
+#include "renderer/passes/draw/turn.h"
 #include "renderer/passes/map/classify.h"
 #include "renderer/passes/filter/interleave.h"
 #include "renderer/passes/map/depth_map.h"
@@ -90,7 +91,7 @@ static bool record(struct technique_run *run, struct pen_error *error)
     const struct adaptive *params = run->params;
     const struct state *state = run->state;
     struct pass_screen pass = {.name = "adaptive", .body = "adaptive_pcf.glsl"};
-    gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, STORAGE_COUNTS, state->counts);
+    pass_bind_counts(run->ctx, state->counts);
     if (params->estimator == ESTIMATOR_CSM) {
         struct convolution_desc desc = CONVOLUTION_DESC(params, true);
         desc.size = params->series_size;

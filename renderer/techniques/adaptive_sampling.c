@@ -1,3 +1,4 @@
+#include "renderer/passes/draw/turn.h"
 #include "renderer/passes/draw/screen.h"
 #include "renderer/passes/map/classify.h"
 #include "renderer/passes/light/light_tree.h"
@@ -189,8 +190,7 @@ static bool count_pass(
     struct pass_texture textures[BIT_GROUPS];
     bind_bits(run->state, textures);
     /* Nothing is written; any framebuffer of the picture's size will do. */
-    gl.ColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_FALSE);
-    bool ok = pass_fill(run->ctx,
+    return pass_fill(run->ctx,
         &(struct pass_fill){.name = "light counts",
             .fragment = "adaptive_count.frag",
             .defines = query ? "#define QUERY\n" : NULL,
@@ -200,11 +200,23 @@ static bool count_pass(
             .framebuffer = run->vis_framebuffer,
             .width = run->width,
             .height = run->height,
+            .mute = true,
             .extra = block,
             .extra_bytes = sizeof *block},
         error);
-    gl.ColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
-    return ok;
+}
+
+/* One query cannot go on in another turn. */
+static bool count_whole(
+    struct refinement *r, const struct count_block *block, GLuint query, struct pen_error *error)
+{
+    struct technique_turns *turns = &r->run->ctx->turns;
+    turns->held = true;
+    gl.BeginQuery(GL_SAMPLES_PASSED, query);
+    bool ok = count_pass(r, block, true, error);
+    gl.EndQuery(GL_SAMPLES_PASSED);
+    turns->held = false;
+    return ok && pass_turn(r->run->ctx, error);
 }
 
 /* Pixels that see a difference within each of the block's quads. */
@@ -217,7 +229,7 @@ static bool count_quads(struct refinement *r, const struct count_block *block,
     if (params->count == COUNT_ATOMIC) {
         static const uint32_t zero;
         gl.ClearNamedBufferData(state->counters, GL_R32UI, GL_RED_INTEGER, GL_UNSIGNED_INT, &zero);
-        gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, STORAGE_COUNTS, state->counters);
+        pass_bind_counts(r->run->ctx, state->counters);
         if (!count_pass(r, block, false, error))
             return false;
         gl.MemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
@@ -227,10 +239,7 @@ static bool count_quads(struct refinement *r, const struct count_block *block,
     for (uint32_t i = 0; i < n; i++) {
         struct count_block one = {.count = {1, block->count[1], block->count[2]}};
         memcpy(one.corners[0], block->corners[i], sizeof one.corners[0]);
-        gl.BeginQuery(GL_SAMPLES_PASSED, state->queries[i]);
-        bool ok = count_pass(r, &one, true, error);
-        gl.EndQuery(GL_SAMPLES_PASSED);
-        if (!ok)
+        if (!count_whole(r, &one, state->queries[i], error))
             return false;
     }
     for (uint32_t i = 0; i < n; i++) { /* all are under way: one wait per level */

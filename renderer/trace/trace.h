@@ -90,6 +90,11 @@ struct pen_trace_job {
     uint32_t seed;
     uint32_t threads;     /* 0: as many as this process may run on */
     uint64_t deadline_ns; /* CLOCK_MONOTONIC; 0: none */
+    /* Called on the caller's thread while nobody traces, whenever about turn_ms have passed. False:
+     * the job ends with an error. NULL: it is done in one go. */
+    bool (*turn)(void *context);
+    void *turn_context;
+    double turn_ms;
 };
 
 struct pen_trace_result { /* each array: width * height, or NULL when not wanted */

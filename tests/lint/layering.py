@@ -12,7 +12,7 @@ PURE = set("""assert ctype errno fenv float inttypes limits locale math stdalign
     stdbool stddef stdint stdio stdlib string strings time""".split())
 SYSTEM = PURE | set("""byteswap dirent dlfcn endian fcntl fnmatch getopt glob immintrin libgen link
     malloc poll pthread pwd sched semaphore setjmp signal spawn syscall termios threads unistd
-    x86intrin xmmintrin emmintrin""".split())
+    ucontext x86intrin xmmintrin emmintrin""".split())
 SOCKETS = set("sys/socket sys/un netdb netinet/in netinet/tcp arpa/inet ifaddrs net/if".split())
 GL = ["GL/*", "EGL/*", "KHR/*", "cglm/*"]
 # One for each library that has no C header, alone in its folder.
@@ -70,6 +70,7 @@ FLOORS = {
         ["passes/draw"], ["passes/map", "passes/rays"], ["passes/light"], ["passes/filter"],
         ["techniques"],
         ["frame"],
+        ["lane"],
         ["renderer"],
         ["catalogue"]],
 }
@@ -92,7 +93,7 @@ def system_allowed(header, kind):
         return name in PURE
     if name in SOCKETS:
         return kind == "sockets"
-    return name in SYSTEM or name.startswith(("sys/", "linux/", "asm/"))
+    return name in SYSTEM or name.startswith(("sys/", "linux/", "asm/", "sanitizer/"))
 
 
 def floor_of(name, top):

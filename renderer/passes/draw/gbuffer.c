@@ -1,5 +1,8 @@
 #include "renderer/passes/draw/gbuffer.h"
+#include "renderer/passes/draw/turn.h"
 #include <string.h>
+
+#define FIRST_PIXELS (1u << 17)
 
 static void fit(struct gbuffer *g, uint32_t width, uint32_t height, bool emission)
 {
@@ -33,6 +36,34 @@ static void set_matrix(GLuint program, const mat4 matrix)
     gl.ProgramUniformMatrix4fv(program, LOCATION_TO_CLIP, 1, GL_FALSE, (const float *)matrix);
 }
 
+/* ground: the program that draws it, or 0. */
+static uint64_t draw_band(struct technique_ctx *ctx, struct scene *scene, const struct view *view,
+    const struct scene_pass *pass, GLuint ground, const struct pass_bands *bands,
+    const struct gbuffer *g)
+{
+    struct cull_view cull;
+    view_to_cull(view, &cull);
+    pass_bands_crop(bands, 1, cull.world_to_clip);
+    set_matrix(pass->opaque, view->world_to_clip);
+    set_matrix(pass->textured, view->world_to_clip);
+    gl.BindFramebuffer(GL_FRAMEBUFFER, g->framebuffer);
+    gl.Viewport(0, 0, (GLsizei)view->width, (GLsizei)view->height);
+    gl.ClipControl(GL_UPPER_LEFT, GL_ZERO_TO_ONE);
+    gl.DepthMask(GL_TRUE);
+    gl.Enable(GL_DEPTH_TEST);
+    gl.DepthFunc(GL_GREATER);
+    pass_bands_aim(bands);
+    uint64_t triangles = scene_draw(scene, &cull, pass);
+    if (ground) {
+        set_matrix(ground, view->world_to_clip);
+        gl.UseProgram(ground);
+        gl.BindVertexArray(ctx->empty_array);
+        gl.DrawArrays(GL_TRIANGLE_STRIP, 0, 4);
+    }
+    gl.Disable(GL_DEPTH_TEST);
+    return triangles;
+}
+
 bool pass_gbuffer(struct technique_ctx *ctx, struct scene *scene, const struct view *view,
     bool ground, struct gbuffer *g, uint64_t *triangles, struct pen_error *error)
 {
@@ -51,26 +82,16 @@ bool pass_gbuffer(struct technique_ctx *ctx, struct scene *scene, const struct v
     if (!pass.opaque || !pass.textured || !flat)
         return false;
     gl_timer_begin(&ctx->timer, PEN_STAGE_GBUFFER, "gbuffer");
-    set_matrix(pass.opaque, view->world_to_clip);
-    set_matrix(pass.textured, view->world_to_clip);
-    set_matrix(flat, view->world_to_clip);
     static const float zero[4] = {0};
-    gl.BindFramebuffer(GL_FRAMEBUFFER, g->framebuffer);
-    gl.Viewport(0, 0, (GLsizei)view->width, (GLsizei)view->height);
-    gl.ClipControl(GL_UPPER_LEFT, GL_ZERO_TO_ONE);
     gl.DepthMask(GL_TRUE);
     gl.ClearNamedFramebufferfv(g->framebuffer, GL_DEPTH, 0, zero);
-    gl.Enable(GL_DEPTH_TEST);
-    gl.DepthFunc(GL_GREATER);
-    struct cull_view cull;
-    view_to_cull(view, &cull);
-    *triangles += scene_draw(scene, &cull, &pass);
-    if (ground) {
-        gl.UseProgram(flat);
-        gl.BindVertexArray(ctx->empty_array);
-        gl.DrawArrays(GL_TRIANGLE_STRIP, 0, 4);
+    struct pass_bands bands;
+    bool more = true, ok = true;
+    pass_bands_begin(ctx, &bands, view->width, view->height, FIRST_PIXELS);
+    while (ok && more) {
+        *triangles += draw_band(ctx, scene, view, &pass, ground ? flat : 0, &bands, g);
+        ok = pass_bands_next(ctx, &bands, &more, error);
     }
-    gl.Disable(GL_DEPTH_TEST);
     gl_timer_end(&ctx->timer);
-    return true;
+    return ok && pass_turn(ctx, error);
 }

@@ -1,7 +1,10 @@
 #include "renderer/passes/draw/screen.h"
 #include "renderer/passes/draw/passes.h"
 #include "renderer/passes/draw/tiles.h"
+#include "renderer/passes/draw/turn.h"
 #include <stdio.h>
+
+#define FIRST_PIXELS (1u << 16)
 
 static void bind_textures(
     struct technique_ctx *ctx, const struct pass_texture *textures, uint32_t count)
@@ -19,52 +22,112 @@ static void unbind_samplers(const struct pass_texture *textures, uint32_t count)
 }
 
 /* The uniform block of one pass; small and short-lived, so it is made anew. */
-static GLuint bind_extra(const void *extra, uint32_t bytes)
+static GLuint make_extra(const void *extra, uint32_t bytes)
 {
     GLuint buffer = 0;
     if (extra) {
         gl.CreateBuffers(1, &buffer);
         gl.NamedBufferStorage(buffer, bytes, extra, 0);
-        gl.BindBufferBase(GL_UNIFORM_BUFFER, UBO_EXTRA, buffer);
     }
     return buffer;
 }
 
-static void begin(struct technique_ctx *ctx, GLuint program, GLuint framebuffer, uint32_t width,
-    uint32_t height, bool add)
+/* One pass over the screen, ready to be drawn in one piece or several. */
+struct drawing {
+    struct technique_ctx *ctx;
+    GLuint program, framebuffer, extra;
+    uint32_t width, height;
+    bool add, mute;
+    const struct gl_texture *tiles; /* NULL: all pixels */
+    int32_t tile_class;
+    struct pass_texture own[4]; /* what a method's pass always reads */
+    uint32_t own_count;
+    const struct pass_texture *textures;
+    uint32_t texture_count;
+};
+
+static void bind(const struct drawing *d)
 {
-    gl.BindFramebuffer(GL_FRAMEBUFFER, framebuffer);
-    gl.Viewport(0, 0, (GLsizei)width, (GLsizei)height);
+    bind_textures(d->ctx, d->own, d->own_count);
+    bind_textures(d->ctx, d->textures, d->texture_count);
+    if (d->extra)
+        gl.BindBufferBase(GL_UNIFORM_BUFFER, UBO_EXTRA, d->extra);
+    if (d->tiles)
+        gl.BindTextureUnit(UNIT_TILES, d->tiles->name);
+}
+
+static void unbind(const struct drawing *d)
+{
+    unbind_samplers(d->own, d->own_count);
+    unbind_samplers(d->textures, d->texture_count);
+}
+
+static void draw_piece(const struct drawing *d, const struct pass_bands *bands)
+{
+    gl.BindFramebuffer(GL_FRAMEBUFFER, d->framebuffer);
+    gl.Viewport(0, 0, (GLsizei)d->width, (GLsizei)d->height);
     gl.ClipControl(GL_UPPER_LEFT, GL_ZERO_TO_ONE);
-    gl.UseProgram(program);
-    gl.BindVertexArray(ctx->empty_array);
-    if (add) {
+    gl.UseProgram(d->program);
+    gl.BindVertexArray(d->ctx->empty_array);
+    if (d->add) {
         gl.Enable(GL_BLEND);
         gl.BlendFunc(GL_ONE, GL_ONE);
     }
+    if (d->mute)
+        gl.ColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_FALSE);
+    pass_bands_aim(bands);
+    if (d->tiles) {
+        GLsizei x = (GLsizei)d->tiles->width, y = (GLsizei)d->tiles->height;
+        /* Whole tiles: a point whose centre is outside the viewport would be lost. */
+        gl.Viewport(0, 0, x * CLASSIFY_TILE, y * CLASSIFY_TILE);
+        gl.Enable(GL_PROGRAM_POINT_SIZE);
+        gl.DrawArrays(GL_POINTS, 0, x * y);
+        gl.Disable(GL_PROGRAM_POINT_SIZE);
+    } else {
+        gl.DrawArrays(GL_TRIANGLES, 0, 3);
+    }
+    gl.Disable(GL_BLEND);
+    gl.ColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
 }
 
-static void draw(struct technique_ctx *ctx, GLuint program, GLuint framebuffer, uint32_t width,
-    uint32_t height, bool add)
+static bool draw(const struct drawing *d, struct pen_error *error)
 {
-    begin(ctx, program, framebuffer, width, height, add);
-    gl.DrawArrays(GL_TRIANGLES, 0, 3);
-    gl.Disable(GL_BLEND);
+    struct pass_bands bands;
+    uint32_t turn = d->ctx->turns.number;
+    bool more = true, ok = true;
+    if (d->tiles)
+        gl.ProgramUniform2i(d->program, LOCATION_TILE, CLASSIFY_TILE, d->tile_class);
+    bind(d);
+    pass_bands_begin(d->ctx, &bands, d->width, d->height, FIRST_PIXELS);
+    while (ok && more) {
+        if (turn != d->ctx->turns.number)
+            bind(d);
+        turn = d->ctx->turns.number;
+        draw_piece(d, &bands);
+        ok = pass_bands_next(d->ctx, &bands, &more, error);
+    }
+    unbind(d);
+    return ok;
 }
 
-void pass_draw_tiles(struct technique_ctx *ctx, GLuint program, GLuint framebuffer,
-    const struct gl_texture *tiles, int32_t tile_class, uint32_t width, uint32_t height, bool add)
+bool pass_draw_tiles(struct technique_ctx *ctx, GLuint program, GLuint framebuffer,
+    const struct gl_texture *tiles, int32_t tile_class, uint32_t width, uint32_t height, bool add,
+    struct pen_error *error)
 {
-    gl.BindTextureUnit(UNIT_TILES, tiles->name);
-    gl.ProgramUniform2i(program, LOCATION_TILE, CLASSIFY_TILE, tile_class);
-    begin(ctx, program, framebuffer, width, height, add);
-    /* Whole tiles: a point whose centre is outside the viewport would be lost. */
-    gl.Viewport(
-        0, 0, (GLsizei)tiles->width * CLASSIFY_TILE, (GLsizei)tiles->height * CLASSIFY_TILE);
-    gl.Enable(GL_PROGRAM_POINT_SIZE);
-    gl.DrawArrays(GL_POINTS, 0, (GLsizei)(tiles->width * tiles->height));
-    gl.Disable(GL_PROGRAM_POINT_SIZE);
-    gl.Disable(GL_BLEND);
+    return draw(&(struct drawing){.ctx = ctx,
+                    .program = program,
+                    .framebuffer = framebuffer,
+                    .tiles = tiles,
+                    .tile_class = tile_class,
+                    .width = width,
+                    .height = height,
+                    .add = add},
+        error);
+}
+
+static void add_own(struct drawing *d, GLuint unit, GLuint name, enum gl_sampler_kind sampler)
+{
+    d->own[d->own_count++] = (struct pass_texture){unit, name, sampler};
 }
 
 bool pass_screen(struct technique_run *run, const struct pass_screen *pass, struct pen_error *error)
@@ -81,32 +144,29 @@ bool pass_screen(struct technique_run *run, const struct pass_screen *pass, stru
         .defines = defines,
         .info = &run->technique->info,
         .params = run->params};
-    GLuint program = gl_programs_get(ctx->programs, &desc, error);
-    if (!program)
+    struct drawing d = {.ctx = ctx,
+        .program = gl_programs_get(ctx->programs, &desc, error),
+        .framebuffer = pass->framebuffer ? pass->framebuffer : run->vis_framebuffer,
+        .width = run->width,
+        .height = run->height,
+        .add = pass->add,
+        .tiles = pass->tiles,
+        .tile_class = TILE_UNDECIDED,
+        .textures = pass->textures,
+        .texture_count = pass->texture_count};
+    if (!d.program)
         return false;
     gl_timer_begin(&ctx->timer, PEN_STAGE_TECHNIQUE, pass->name);
-    gl.BindTextureUnit(UNIT_DEPTH, run->gbuffer->depth.texture.name);
-    gl.BindTextureUnit(UNIT_NORMAL, run->gbuffer->normal.texture.name);
-    gl.BindTextureUnit(UNIT_EMISSION, run->emission->name);
-    gl.BindSampler(UNIT_EMISSION, ctx->samplers.names[GL_SAMPLE_TRILINEAR]);
-    if (pass->shadow) {
-        gl.BindTextureUnit(UNIT_SHADOW, pass->shadow->name);
-        gl.BindSampler(UNIT_SHADOW, ctx->samplers.names[GL_SAMPLE_NEAREST_BORDER]);
-    }
-    bind_textures(ctx, pass->textures, pass->texture_count);
-    GLuint extra = bind_extra(pass->extra, pass->extra_bytes);
-    GLuint framebuffer = pass->framebuffer ? pass->framebuffer : run->vis_framebuffer;
-    if (pass->tiles)
-        pass_draw_tiles(ctx, program, framebuffer, pass->tiles, TILE_UNDECIDED, run->width,
-            run->height, pass->add);
-    else
-        draw(ctx, program, framebuffer, run->width, run->height, pass->add);
-    unbind_samplers(pass->textures, pass->texture_count);
-    gl.BindSampler(UNIT_EMISSION, 0);
-    gl.BindSampler(UNIT_SHADOW, 0);
-    gl.DeleteBuffers(1, &extra);
+    add_own(&d, UNIT_DEPTH, run->gbuffer->depth.texture.name, GL_SAMPLE_NEAREST);
+    add_own(&d, UNIT_NORMAL, run->gbuffer->normal.texture.name, GL_SAMPLE_NEAREST);
+    add_own(&d, UNIT_EMISSION, run->emission->name, GL_SAMPLE_TRILINEAR);
+    if (pass->shadow)
+        add_own(&d, UNIT_SHADOW, pass->shadow->name, GL_SAMPLE_NEAREST_BORDER);
+    d.extra = make_extra(pass->extra, pass->extra_bytes);
+    bool ok = draw(&d, error);
+    gl.DeleteBuffers(1, &d.extra);
     gl_timer_end(&ctx->timer);
-    return true;
+    return ok && pass_turn(ctx, error);
 }
 
 bool pass_fill(struct technique_ctx *ctx, const struct pass_fill *pass, struct pen_error *error)
@@ -116,17 +176,23 @@ bool pass_fill(struct technique_ctx *ctx, const struct pass_fill *pass, struct p
         .defines = pass->defines,
         .info = pass->info,
         .params = pass->params};
-    GLuint program = gl_programs_get(ctx->programs, &desc, error);
-    if (!program)
+    struct drawing d = {.ctx = ctx,
+        .program = gl_programs_get(ctx->programs, &desc, error),
+        .framebuffer = pass->framebuffer,
+        .width = pass->width,
+        .height = pass->height,
+        .add = pass->add,
+        .mute = pass->mute,
+        .textures = pass->textures,
+        .texture_count = pass->texture_count};
+    if (!d.program)
         return false;
     gl_timer_begin(&ctx->timer, pass->stage, pass->name);
-    bind_textures(ctx, pass->textures, pass->texture_count);
-    GLuint extra = bind_extra(pass->extra, pass->extra_bytes);
-    draw(ctx, program, pass->framebuffer, pass->width, pass->height, pass->add);
-    unbind_samplers(pass->textures, pass->texture_count);
-    gl.DeleteBuffers(1, &extra);
+    d.extra = make_extra(pass->extra, pass->extra_bytes);
+    bool ok = draw(&d, error);
+    gl.DeleteBuffers(1, &d.extra);
     gl_timer_end(&ctx->timer);
-    return true;
+    return ok && pass_turn(ctx, error);
 }
 
 const struct gl_target *pass_sum(struct technique_run *run)

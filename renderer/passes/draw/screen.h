@@ -38,6 +38,7 @@ struct pass_fill {
     GLuint framebuffer;
     uint32_t width, height;
     bool add;
+    bool mute; /* no colour is written: the pass counts */
     const void *extra;
     uint32_t extra_bytes;
     const struct pen_technique_info *info; /* parameters for P(name), or NULL */
@@ -50,8 +51,9 @@ bool pass_fill(struct technique_ctx *ctx, const struct pass_fill *pass, struct p
 const struct gl_target *pass_sum(struct technique_run *run);
 
 /* Draws the tiles of one class (enum tile_class) of an image of width x height pixels. */
-void pass_draw_tiles(struct technique_ctx *ctx, GLuint program, GLuint framebuffer,
-    const struct gl_texture *tiles, int32_t tile_class, uint32_t width, uint32_t height, bool add);
+bool pass_draw_tiles(struct technique_ctx *ctx, GLuint program, GLuint framebuffer,
+    const struct gl_texture *tiles, int32_t tile_class, uint32_t width, uint32_t height, bool add,
+    struct pen_error *error);
 
 /* Methods that filter over the screen collect the faces of a light first. */
 bool pass_is_first_face(const struct technique_run *run);

@@ -37,10 +37,8 @@ bool pass_penumbra_tiles(struct technique_run *run, uint32_t map_size, float mar
     if (!*tiles)
         return true;
     GLuint program = gl_programs_get(run->ctx->programs, &program_desc, error);
-    if (program)
-        pass_draw_tiles(run->ctx, program, spread->framebuffer, *tiles, TILE_UMBRA, run->width,
-            run->height, false);
-    return program != 0;
+    return program && pass_draw_tiles(run->ctx, program, spread->framebuffer, *tiles, TILE_UMBRA,
+                          run->width, run->height, false, error);
 }
 
 bool pass_penumbra_spread(

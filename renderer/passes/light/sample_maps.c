@@ -1,10 +1,13 @@
 #include "renderer/passes/light/sample_maps.h"
 #include "renderer/passes/draw/passes.h"
+#include "renderer/passes/draw/turn.h"
 #include "renderer/passes/map/depth_map.h"
 #include "renderer/passes/map/shadow_cache.h"
 #include <assert.h>
 #include <math.h>
 #include <string.h>
+
+#define MAPS_AT_ONCE 4 /* between two looks at the time */
 
 static float radical_inverse(uint32_t i)
 {
@@ -69,10 +72,12 @@ bool pass_sample_views(struct technique_run *run, const struct sample_view *view
             framebuffer, GL_DEPTH_ATTACHMENT, array->name, 0, (GLint)view->layer);
         ok = pass_draw_casters(
             run, framebuffer, array->width, view->point.at, view->rect, false, error);
+        if (ok && i % MAPS_AT_ONCE == MAPS_AT_ONCE - 1)
+            ok = pass_turn_inside(run->ctx, error);
     }
     gl.DeleteFramebuffers(1, &framebuffer);
     gl_timer_end(&run->ctx->timer);
-    return ok;
+    return ok && pass_turn(run->ctx, error);
 }
 
 /* Those layers of an array of points[0 .. count) whose bit is set. */
@@ -167,7 +172,7 @@ const struct gl_texture *pass_sample_page(struct technique_run *run,
             missing |= 1u << i;
     if (!missing)
         return &input->textures[0];
-    shadow_cache_mark_built(run->ctx->shadows);
+    shadow_cache_mark_built(run->ctx);
     if (!draw_layers(run, points, count, missing, &input->textures[0], error))
         return NULL;
     for (uint32_t i = 0; i < count; i++)

@@ -1,5 +1,6 @@
 #include "renderer/passes/map/blur.h"
 #include "renderer/passes/draw/screen.h"
+#include "renderer/passes/draw/turn.h"
 #include <math.h>
 #include <string.h>
 
@@ -58,6 +59,7 @@ bool pass_blur(struct technique_ctx *ctx, const struct gl_texture *texture, uint
         gl_timer_begin(&ctx->timer, PEN_STAGE_SHADOW, "mips");
         gl.GenerateTextureMipmap(texture->name);
         gl_timer_end(&ctx->timer);
+        ok = pass_turn(ctx, error);
     }
     return ok;
 }

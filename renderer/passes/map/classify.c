@@ -37,9 +37,8 @@ bool pass_fill_umbra(struct technique_run *run, const struct gl_texture *tiles, 
     GLuint program = gl_programs_get(run->ctx->programs, &desc, error);
     if (!program)
         return false;
-    pass_draw_tiles(
-        run->ctx, program, framebuffer, tiles, TILE_UMBRA, run->width, run->height, false);
-    return true;
+    return pass_draw_tiles(
+        run->ctx, program, framebuffer, tiles, TILE_UMBRA, run->width, run->height, false, error);
 }
 
 bool pass_classify(struct technique_run *run, const struct classify_desc *desc,

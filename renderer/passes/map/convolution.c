@@ -1,5 +1,6 @@
 #include "renderer/passes/map/convolution.h"
 #include "renderer/passes/draw/screen.h"
+#include "renderer/passes/draw/turn.h"
 #include "renderer/passes/map/depth_map.h"
 #include "renderer/passes/map/sat.h"
 #include <math.h>
@@ -113,7 +114,7 @@ static bool fill(struct technique_run *run, const struct gl_texture *map, struct
     gl_timer_begin(&run->ctx->timer, PEN_STAGE_SHADOW, "convolution mips");
     gl.GenerateTextureMipmap(array->name);
     gl_timer_end(&run->ctx->timer);
-    return ok;
+    return ok && pass_turn(run->ctx, error);
 }
 
 static bool build(struct technique_run *run, const struct shadow_key *key,

@@ -1,5 +1,6 @@
 #include "renderer/passes/map/peel.h"
 #include "renderer/passes/draw/screen.h"
+#include "renderer/passes/draw/turn.h"
 #include "renderer/passes/map/depth_map.h"
 
 #define SHARED_ROWS "renderer/shaders/map/level.def"
@@ -30,6 +31,7 @@ static bool draw_layers(struct technique_run *run, uint32_t size, const struct g
                          run, target->framebuffer, size, center, run->face->rect, false, error);
         if (ok)
             copy_layer(&target->texture, maps, layer);
+        ok = ok && pass_turn_inside(run->ctx, error);
     }
     gl_timer_end(&run->ctx->timer);
     gl_target_destroy(&scratch[0]);

@@ -1,5 +1,6 @@
 #include "renderer/passes/map/sat.h"
 #include "renderer/passes/draw/screen.h"
+#include "renderer/passes/draw/turn.h"
 #include "renderer/passes/map/depth_map.h"
 #include <math.h>
 #include <stdlib.h>
@@ -88,7 +89,7 @@ bool sat_scan(struct technique_ctx *ctx, const struct gl_texture *from, const st
     bool host = path == SAT_HOST || (path == SAT_AUTO && ctx->software);
     bool ok = host ? scan_on_host(from, to, error) : scan_on_device(ctx, from, to, error);
     gl_timer_end(&ctx->timer);
-    return ok;
+    return ok && pass_turn(ctx, error);
 }
 
 /* Side and widest window. The blocker search is widest at the far plane; smaller lights still need

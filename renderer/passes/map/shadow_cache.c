@@ -18,13 +18,14 @@ struct entry {
     struct face_key face;
     struct shadow_key key;
     struct shadow_input input;
-    uint64_t bytes, last_frame;
+    uint64_t bytes, last_use;
+    uint32_t lanes; /* a bit for each whose frame uses it */
 };
 
 struct shadow_cache {
     struct entry *entries; /* most recently made first; a handful, so a list will do */
-    uint64_t bytes, frame;
-    uint32_t built;
+    uint64_t bytes, clock;
+    uint32_t built[SHADOW_CACHE_LANES]; /* in the frame of each lane */
 };
 
 struct shadow_cache *shadow_cache_create(void)
@@ -65,6 +66,12 @@ static void make_face_key(const struct light_face *face, uint32_t casters, struc
     key->casters = casters;
 }
 
+static void use(struct shadow_cache *cache, struct entry *e, uint32_t lane)
+{
+    e->last_use = ++cache->clock;
+    e->lanes |= 1u << lane;
+}
+
 const struct shadow_input *shadow_cache_get(struct technique_run *run, const struct shadow_key *key,
     shadow_build build, struct pen_error *error)
 {
@@ -76,7 +83,7 @@ const struct shadow_input *shadow_cache_get(struct technique_run *run, const str
             e->key.size == key->size && !strcmp(e->key.kind, key->kind) &&
             !memcmp(e->key.extra, key->extra, sizeof key->extra) &&
             !memcmp(&e->face, &face, sizeof face)) {
-            e->last_frame = cache->frame;
+            use(cache, e, run->ctx->lane);
             return &e->input;
         }
     struct entry *e = pen_alloc_zero(1, sizeof *e);
@@ -84,7 +91,6 @@ const struct shadow_input *shadow_cache_get(struct technique_run *run, const str
     e->pose = run->scene->pose;
     e->face = face;
     e->key = *key;
-    e->last_frame = cache->frame;
     bool ok = build(run, key, &e->input, error);
     for (int i = 0; i < SHADOW_INPUT_TEXTURES; i++)
         e->bytes += e->input.textures[i].bytes;
@@ -93,15 +99,16 @@ const struct shadow_input *shadow_cache_get(struct technique_run *run, const str
         free_entry(cache, e);
         return NULL;
     }
-    cache->built++;
+    use(cache, e, run->ctx->lane);
+    cache->built[run->ctx->lane]++;
     e->next = cache->entries;
     cache->entries = e;
     return &e->input;
 }
 
-void shadow_cache_mark_built(struct shadow_cache *cache)
+void shadow_cache_mark_built(const struct technique_ctx *ctx)
 {
-    cache->built++;
+    ctx->shadows->built[ctx->lane]++;
 }
 
 uint64_t shadow_cache_bytes(const struct shadow_cache *cache)
@@ -114,8 +121,7 @@ void shadow_cache_trim(struct shadow_cache *cache, uint64_t bytes)
     while (cache->bytes > bytes) {
         struct entry **oldest = NULL;
         for (struct entry **at = &cache->entries; *at; at = &(*at)->next)
-            if ((*at)->last_frame < cache->frame &&
-                (!oldest || (*at)->last_frame <= (*oldest)->last_frame))
+            if (!(*at)->lanes && (!oldest || (*at)->last_use < (*oldest)->last_use))
                 oldest = at;
         if (!oldest)
             return;
@@ -138,13 +144,19 @@ void shadow_cache_drop_scene(struct shadow_cache *cache, const struct scene *sce
     }
 }
 
-void shadow_cache_begin_frame(struct shadow_cache *cache)
+void shadow_cache_begin_frame(const struct technique_ctx *ctx)
 {
-    cache->frame++;
-    cache->built = 0;
+    ctx->shadows->built[ctx->lane] = 0;
+    shadow_cache_end_frame(ctx);
 }
 
-bool shadow_cache_all_reused(const struct shadow_cache *cache)
+void shadow_cache_end_frame(const struct technique_ctx *ctx)
 {
-    return cache->built == 0;
+    for (struct entry *e = ctx->shadows->entries; e; e = e->next)
+        e->lanes &= ~(1u << ctx->lane);
+}
+
+bool shadow_cache_all_reused(const struct technique_ctx *ctx)
+{
+    return ctx->shadows->built[ctx->lane] == 0;
 }

@@ -4,6 +4,7 @@
 #include "renderer/technique.h"
 
 #define SHADOW_INPUT_TEXTURES 6
+#define SHADOW_CACHE_LANES 32 /* as bits are counted */
 
 /* What an input is. A kind of a new method is a string literal of its own: two inputs are the same
  * when kind, scene and its pose, light face, size and extra agree. */
@@ -29,13 +30,15 @@ const struct shadow_input *shadow_cache_get(struct technique_run *run, const str
     shadow_build build, struct pen_error *error);
 
 /* For inputs that are filled bit by bit: something was drawn into one in this frame. */
-void shadow_cache_mark_built(struct shadow_cache *cache);
+void shadow_cache_mark_built(const struct technique_ctx *ctx);
 
 uint64_t shadow_cache_bytes(const struct shadow_cache *cache);
-/* Drops the least recently used inputs of earlier frames until `bytes` or less are held. */
+/* Drops the least recently used inputs that no frame in progress uses until `bytes` or less are
+ * held. */
 void shadow_cache_trim(struct shadow_cache *cache, uint64_t bytes);
 void shadow_cache_drop_scene(struct shadow_cache *cache, const struct scene *scene);
-/* Starts a frame: what is used from now on is not trimmed. Sets the counters to 0. */
-void shadow_cache_begin_frame(struct shadow_cache *cache);
-/* 1 when every input of this frame was already there. */
-bool shadow_cache_all_reused(const struct shadow_cache *cache);
+/* Between these, what the lane's frame uses is not trimmed. The first sets its counter to 0. */
+void shadow_cache_begin_frame(const struct technique_ctx *ctx);
+void shadow_cache_end_frame(const struct technique_ctx *ctx);
+/* 1 when every input of the lane's frame was already there. */
+bool shadow_cache_all_reused(const struct technique_ctx *ctx);

@@ -1,5 +1,6 @@
 /* Rays in compute shaders. Work is cut into short dispatches, each flushed on its own, so that no
  * driver's watchdog takes a long job for a hang. */
+#include "renderer/passes/draw/turn.h"
 #include "renderer/passes/rays/ray_scene.h"
 #include "renderer/passes/rays/rays.h"
 #include "renderer/trace/points.h"
@@ -26,6 +27,7 @@ struct work {
     struct pen_trace_light light;
     struct trace_points points;
     uint32_t samples, listed;
+    const struct gl_target *marked; /* IMAGE_MARKS; NULL: nothing */
     bool pretest;
     char defines[512];
 };
@@ -47,18 +49,25 @@ static void make_defines(struct work *w)
 static GLuint program(const struct work *w, const char *file, struct pen_error *error)
 {
     struct gl_program_desc desc = {.compute = file, .defines = w->defines};
-    GLuint name = gl_programs_get(w->run->ctx->programs, &desc, error);
-    if (name)
-        gl.UseProgram(name);
-    return name;
+    return gl_programs_get(w->run->ctx->programs, &desc, error);
 }
 
-static void dispatch(uint32_t x, uint32_t y)
+static void bind(const struct work *w);
+
+/* One piece of work, and then somebody else's turn. */
+static bool dispatch(struct work *w, GLuint name, uint32_t x, uint32_t y, struct pen_error *error)
 {
+    struct technique_ctx *ctx = w->run->ctx;
+    gl.UseProgram(name);
     gl.DispatchCompute(x, y, 1);
     gl.MemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_SHADER_IMAGE_ACCESS_BARRIER_BIT |
                      GL_TEXTURE_FETCH_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
     gl.Flush();
+    uint32_t turn = ctx->turns.number;
+    bool ok = pass_turn_inside(ctx, error);
+    if (turn != ctx->turns.number)
+        bind(w);
+    return ok;
 }
 
 static uint32_t groups(uint32_t items, uint32_t size)
@@ -151,6 +160,8 @@ static void bind(const struct work *w)
     gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, STORAGE_RAY_COUNTERS, t->counters);
     bind_image(IMAGE_VISIBILITY, &t->visibility.texture);
     bind_image(IMAGE_ERROR, &t->standard_error.texture);
+    if (w->marked)
+        bind_image(IMAGE_MARKS, &w->marked->texture);
     gl.BindTextureUnit(UNIT_RAY_POSITION, t->receivers[0].texture.name);
     gl.BindTextureUnit(UNIT_RAY_NORMAL, t->receivers[1].texture.name);
     gl.BindTextureUnit(UNIT_RAY_VERDICTS, t->verdicts.texture.name);
@@ -159,6 +170,12 @@ static void bind(const struct work *w)
     for (GLuint unit = UNIT_RAY_POSITION; unit < UNIT_RAY_END; unit++)
         gl.BindSampler(unit, 0);
     gl.BindSampler(UNIT_EMISSION, w->run->ctx->samplers.names[GL_SAMPLE_LINEAR]);
+}
+
+static void mark(struct work *w, const struct gl_target *target)
+{
+    w->marked = target;
+    bind_image(IMAGE_MARKS, &target->texture);
 }
 
 /* A few rays for all, in bands of rows. */
@@ -170,17 +187,17 @@ static bool pretest(struct work *w, struct pen_error *error)
     GLuint name = program(w, "ray_pretest.comp", error);
     if (!name)
         return false;
-    bind_image(IMAGE_MARKS, &w->targets->verdicts.texture);
+    mark(w, &w->targets->verdicts);
     for (uint32_t y = 0; y < height; y += rows * RAY_TILE) {
         uint32_t left = groups(height - y, RAY_TILE);
         gl.ProgramUniform1ui(name, LOCATION_FIRST_ROW, y);
-        dispatch(columns, left < rows ? left : rows);
+        if (!dispatch(w, name, columns, left < rows ? left : rows, error))
+            return false;
     }
-    if (!program(w, "ray_spread.comp", error))
+    if (!(name = program(w, "ray_spread.comp", error)))
         return false;
-    bind_image(IMAGE_MARKS, &w->targets->spread.texture);
-    dispatch(columns, groups(height, RAY_TILE));
-    return true;
+    mark(w, &w->targets->spread);
+    return dispatch(w, name, columns, groups(height, RAY_TILE), error);
 }
 
 static struct ray_counters read_counters(const struct work *w)
@@ -193,16 +210,18 @@ static struct ray_counters read_counters(const struct work *w)
 /* Lists who gets all samples; settles the others. */
 static bool select_receivers(struct work *w, struct pen_error *error)
 {
-    if (!program(w, "ray_select.comp", error))
+    GLuint name = program(w, "ray_select.comp", error);
+    if (!name || !dispatch(w, name, groups(w->run->width, RAY_TILE),
+                     groups(w->run->height, RAY_TILE), error))
         return false;
-    dispatch(groups(w->run->width, RAY_TILE), groups(w->run->height, RAY_TILE));
     w->listed = read_counters(w).list_count;
     return true;
 }
 
 /* All samples of the listed receivers from `first`, slice by slice of at most `most` points. Slices
  * hold whole pairs. */
-static void sample_range(const struct work *w, GLuint name, uint32_t first, uint32_t most)
+static bool sample_range(
+    struct work *w, GLuint name, uint32_t first, uint32_t most, struct pen_error *error)
 {
     const struct trace_points *p = &w->points;
     uint32_t left = w->listed - first, step = 2, point = 0;
@@ -219,10 +238,12 @@ static void sample_range(const struct work *w, GLuint name, uint32_t first, uint
                 !last                     ? 0u
                 : b + 1 == p->block_count ? 2u
                                           : 1u);
-            dispatch(groups(count, RAY_GROUP), 1);
+            if (!dispatch(w, name, groups(count, RAY_GROUP), 1, error))
+                return false;
         }
         point = end;
     }
+    return true;
 }
 
 static bool sample(struct work *w, struct pen_error *error)
@@ -236,7 +257,8 @@ static bool sample(struct work *w, struct pen_error *error)
         gl.NamedBufferSubData(
             w->targets->counters, offsetof(struct ray_counters, cut), sizeof zero, &zero);
         for (uint32_t first = 0; first < w->listed; first += RECEIVERS_PER_DISPATCH)
-            sample_range(w, name, first, most);
+            if (!sample_range(w, name, first, most, error))
+                return false;
         if (!read_counters(w).cut)
             return true;
     }

@@ -1,6 +1,7 @@
 /* Rays on the CPU: read the receivers back, trace, upload. */
 #include "protocol/container.h"
 #include "protocol/memory.h"
+#include "renderer/passes/draw/turn.h"
 #include "renderer/passes/rays/rays.h"
 #include <stdlib.h>
 #include <string.h>
@@ -69,6 +70,17 @@ static void write_target(const struct technique_run *run, struct gl_target *targ
         layout, GL_FLOAT, from);
 }
 
+struct waiting {
+    struct technique_ctx *ctx;
+    struct pen_error *error;
+};
+
+static bool turn(void *context)
+{
+    struct waiting *w = context;
+    return pass_turn(w->ctx, w->error);
+}
+
 bool pass_rays_host(struct technique_run *run, const struct ray_job *job, struct ray_targets *t,
     struct pen_error *error)
 {
@@ -94,6 +106,12 @@ bool pass_rays_host(struct technique_run *run, const struct ray_job *job, struct
         .depth_error = RAY_DEPTH_ERROR,
         .aim_error = ray_aim_error(run),
         .seed = job->seed};
+    struct waiting waiting = {run->ctx, error};
+    if (run->ctx->turns.fiber) {
+        trace.turn = turn;
+        trace.turn_context = &waiting;
+        trace.turn_ms = run->ctx->turns.most_ms;
+    }
     memcpy(trace.eye, run->view->eye, sizeof trace.eye);
     bool wants_error = run->variance_framebuffer != 0;
     struct pen_trace_result result = {
@@ -117,5 +135,5 @@ bool pass_rays_host(struct technique_run *run, const struct ray_job *job, struct
     free(visibility);
     free(standard_error);
     free(emission);
-    return ok;
+    return ok && pass_turn(run->ctx, error);
 }

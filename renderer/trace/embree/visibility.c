@@ -6,6 +6,7 @@
 
 #define TILE 16 /* receivers along an edge; a multiple of 4 */
 #define TILE_RECEIVERS (TILE * TILE)
+#define FIRST_TILES 4 /* of each thread, before their speed is known */
 
 enum verdict { NO_RECEIVER, UMBRA, LIT, MIXED };
 
@@ -21,6 +22,7 @@ struct run {
     uint8_t *verdicts; /* adaptive: enum verdict per receiver */
     uint8_t *full;     /* adaptive: 1 where all samples are wanted */
     uint32_t tiles_x, tile_width, tile_height;
+    uint32_t tiles, first_tile; /* of all, and of the piece at hand */
     _Atomic uint64_t rays, receivers, full_receivers;
     atomic_bool late;
 };
@@ -32,6 +34,7 @@ struct tile {
 static struct tile tile_of(const struct run *run, uint32_t item)
 {
     const struct pen_trace_job *job = run->job;
+    item += run->first_tile;
     struct tile t = {item % run->tiles_x * run->tile_width, item / run->tiles_x * run->tile_height};
     t.x1 = t.x0 + run->tile_width < job->width ? t.x0 + run->tile_width : job->width;
     t.y1 = t.y0 + run->tile_height < job->height ? t.y0 + run->tile_height : job->height;
@@ -311,20 +314,43 @@ static bool check_job(
     return true;
 }
 
+/* All tiles; in pieces that last about a turn each when others want to come in between. */
+static bool over_tiles(
+    struct run *run, uint32_t threads, void (*work)(void *context, uint32_t item), double *seconds)
+{
+    const struct pen_trace_job *job = run->job;
+    uint32_t piece = job->turn ? FIRST_TILES * threads : run->tiles;
+    for (run->first_tile = 0; run->first_tile < run->tiles;) {
+        uint32_t left = run->tiles - run->first_tile;
+        double start = trace_seconds();
+        piece = piece < left ? piece : left;
+        trace_parallel(threads, piece, work, run, seconds);
+        run->first_tile += piece;
+        if (!job->turn || run->first_tile == run->tiles)
+            continue;
+        double turns = 1e3 * (trace_seconds() - start) / job->turn_ms;
+        piece = (uint32_t)fmax(threads, piece * fmin(1 / fmax(turns, 1e-6), 4));
+        if (atomic_load(&run->late) || !job->turn(job->turn_context)) {
+            atomic_store(&run->late, true);
+            break;
+        }
+    }
+    return !atomic_load(&run->late);
+}
+
 /* The adaptive mode's first half: settles what the pre-test settles and leaves the
  * rest in `full`. */
 static bool select_receivers(
-    struct run *run, uint32_t threads, uint32_t tiles, double *cpu_seconds, struct pen_error *error)
+    struct run *run, uint32_t threads, double *cpu_seconds, struct pen_error *error)
 {
     size_t count = (size_t)run->job->width * run->job->height;
     run->verdicts = calloc(count, 1);
     run->full = calloc(count, 1);
     if (!run->verdicts || !run->full)
         return pen_fail(error, PEN_INTERNAL, "", "Out of memory.");
-    trace_parallel(threads, tiles, pretest_tile, run, cpu_seconds);
-    if (!dilate(run))
+    if (over_tiles(run, threads, pretest_tile, cpu_seconds) && !dilate(run))
         return pen_fail(error, PEN_INTERNAL, "", "Out of memory.");
-    trace_parallel(threads, tiles, settle_tile, run, cpu_seconds);
+    over_tiles(run, threads, settle_tile, cpu_seconds);
     return true;
 }
 
@@ -361,14 +387,13 @@ bool pen_trace_visibility(struct pen_trace_scene *scene, const struct pen_trace_
     run.tile_height = job->height == 1 ? 1 : TILE;
     run.tile_width = job->height == 1 ? TILE_RECEIVERS : TILE;
     run.tiles_x = (job->width + run.tile_width - 1) / run.tile_width;
-    uint32_t tiles = run.tiles_x * ((job->height + run.tile_height - 1) / run.tile_height);
+    run.tiles = run.tiles_x * ((job->height + run.tile_height - 1) / run.tile_height);
     uint32_t threads = trace_thread_count(job->threads);
-    trace_parallel(threads, tiles, clear_tile, &run, &cpu_seconds);
+    over_tiles(&run, threads, clear_tile, &cpu_seconds);
     if (job->adaptive && run.samples > TRACE_PRETEST_NET + TRACE_PRETEST_RIM &&
-        !select_receivers(&run, threads, tiles, &cpu_seconds, error))
+        !select_receivers(&run, threads, &cpu_seconds, error))
         goto fail;
-    trace_parallel(threads, tiles, sample_tile, &run, &cpu_seconds);
-    if (atomic_load(&run.late)) {
+    if (!over_tiles(&run, threads, sample_tile, &cpu_seconds)) {
         pen_fail(error, PEN_DEADLINE, "", "The deadline passed while rays were traced.");
         goto fail;
     }

@@ -1,0 +1,30 @@
+/* A frame is made in turns: between two pieces of it other frames may be drawn, or it is given up. */
+#pragma once
+#include "renderer/technique.h"
+
+/* Called by every pass when a piece of work is done and nothing of it is bound any more. When the
+ * turn has lasted long enough this comes back only with the next one; ctx->turns.number then
+ * differs, and of GL's state only the blocks of frame, light and parameters are as before. False,
+ * with the error filled, when the frame is not wanted any more. */
+bool pass_turn(struct technique_ctx *ctx, struct pen_error *error);
+/* As pass_turn, within a pass that is being timed: waits for what was drawn so far. */
+bool pass_turn_inside(struct technique_ctx *ctx, struct pen_error *error);
+/* Binds a method's counters, for all of its passes. */
+void pass_bind_counts(struct technique_ctx *ctx, GLuint buffer);
+
+/* A large drawing is cut into bands of rows, each as long as a turn should last. */
+struct pass_bands {
+    uint32_t y, rows, height, width; /* px; the band at hand: y to y + rows */
+    double since_ms;
+};
+/* first_pixels: of the first band, before the drawing's speed is known. */
+void pass_bands_begin(struct technique_ctx *ctx, struct pass_bands *bands, uint32_t width,
+    uint32_t height, uint32_t first_pixels);
+/* What outside the band need not be drawn: narrows a matrix to clip space, in which row 0 is at y =
+ * `top` (-1 or 1). */
+void pass_bands_crop(const struct pass_bands *bands, float top, mat4 to_clip);
+/* Scissors the band; call before each drawing. */
+void pass_bands_aim(const struct pass_bands *bands);
+/* After it. *more: there is another band. False as pass_turn. */
+bool pass_bands_next(
+    struct technique_ctx *ctx, struct pass_bands *bands, bool *more, struct pen_error *error);

@@ -1,0 +1,190 @@
+/* Renders in turns: whatever is drawn in between, and however finely a render is cut, its picture is
+ * the one it gives in one piece; one that is given up leaves nothing behind. */
+#include "protocol/fnv.h"
+#include "renderer/gl/fiber.h"
+#include "renderer/gl/target.h"
+#include "tests/gl/fixture.h"
+#include "tests/unit/check.h"
+#include <stdio.h>
+#include <string.h>
+
+#define SHORTEST 0.0 /* ms: a pause wherever there can be one */
+
+struct counting {
+    struct gl_fiber *fiber;
+    int sum;
+};
+
+static void count_to_three(void *context)
+{
+    struct counting *c = context;
+    for (int i = 1; i <= 3; i++) {
+        c->sum += i;
+        gl_fiber_pause(c->fiber);
+    }
+}
+
+static void check_fiber(void)
+{
+    struct counting c[2] = {{gl_fiber_create(), 0}, {gl_fiber_create(), 100}};
+    for (int round = 0; round < 2; round++) {
+        for (int k = 0; k < 2; k++)
+            gl_fiber_begin(c[k].fiber, count_to_three, &c[k]);
+        for (int i = 0; i < 3; i++)
+            for (int k = 0; k < 2; k++)
+                CHECK(!gl_fiber_resume(c[k].fiber));
+        for (int k = 0; k < 2; k++)
+            CHECK(gl_fiber_resume(c[k].fiber));
+    }
+    CHECK(c[0].sum == 12 && c[1].sum == 112);
+    for (int k = 0; k < 2; k++)
+        gl_fiber_destroy(c[k].fiber);
+}
+
+static uint64_t hash_frame(const struct pen_frame *frame)
+{
+    uint64_t hash = PEN_FNV_START;
+    static const size_t bytes[] = {4, 8, 16};
+    for (uint32_t i = 0; i < frame->plane_count; i++)
+        hash = pen_fnv(hash, frame->planes[i].data,
+            (size_t)frame->width * frame->height * bytes[frame->planes[i].pixel]);
+    return hash;
+}
+
+static uint64_t whole(struct pen_renderer *r, const struct pen_request *request)
+{
+    struct pen_result result;
+    struct pen_frame frame;
+    struct pen_error error = {0};
+    pen_renderer_drop_shadows(r);
+    if (!pen_renderer_render(r, request, &frame, &result, &error)) {
+        fprintf(stderr, "%s: %s\n", request->technique, error.message);
+        return 0;
+    }
+    uint64_t hash = hash_frame(&frame);
+    pen_frame_finish(&frame);
+    return hash;
+}
+
+/* Both side by side, a turn each; returns the number of turns. */
+static uint32_t in_turns(struct pen_renderer *r, const struct pen_request *const requests[2],
+    double ms, uint64_t hashes[2])
+{
+    static struct pen_result results[2];
+    struct pen_frame frames[2];
+    struct pen_error error = {0};
+    struct pen_render *renders[2];
+    bool ended[2] = {false, false};
+    uint32_t turns = 0;
+    pen_renderer_drop_shadows(r);
+    for (int k = 0; k < 2; k++)
+        renders[k] = pen_render_begin(r, requests[k], &frames[k], &results[k], &error);
+    if (!renders[0] || !renders[1]) {
+        fprintf(stderr, "%s\n", error.message);
+        return 0;
+    }
+    while (!ended[0] || !ended[1])
+        for (int k = 0; k < 2; k++)
+            if (!ended[k]) {
+                ended[k] = pen_render_advance(renders[k], ms);
+                turns++;
+            }
+    for (int k = 0; k < 2; k++) {
+        hashes[k] = 0;
+        if (!pen_render_end(renders[k], &error))
+            fprintf(stderr, "%s: %s\n", requests[k]->technique, error.message);
+        else
+            hashes[k] = hash_frame(&frames[k]);
+        pen_frame_finish(&frames[k]);
+    }
+    return turns;
+}
+
+static void few_samples(struct pen_request *request, double count)
+{
+    const struct pen_technique_info *info =
+        pen_catalogue_find(pen_renderer_catalogue(), request->technique);
+    const struct pen_param *row = pen_param_find(info->params, "samples");
+    if (row && row->min <= count && row->max >= count)
+        pen_param_store(row, request->technique_params, &count, "", NULL);
+}
+
+/* Every method beside every neighbour in the list, with other sizes, cameras and lights. */
+static void check_methods(struct pen_renderer *r, const uint8_t scenes[2][PEN_ID_BYTES])
+{
+    const struct pen_catalogue *catalogue = pen_renderer_catalogue();
+    for (uint32_t i = 0; i < catalogue->count; i++) {
+        struct pen_request a, b;
+        fixture_request(&a, scenes[0], catalogue->items[i]->name);
+        fixture_request(&b, scenes[1], catalogue->items[(i + 1) % catalogue->count]->name);
+        a.antialias = 2;
+        a.height = 200; /* more than a band */
+        b.width = 333, b.height = 130;
+        b.lights_given = true;
+        b.light_count = 2;
+        for (int k = 0; k < 2; k++) {
+            pen_light_default(&b.lights[k], k ? PEN_LIGHT_RECT : PEN_LIGHT_SUN);
+            b.lights[k].position[0] = 2 * k, b.lights[k].position[1] = 4;
+            b.lights[k].position[2] = 1;
+        }
+        few_samples(&a, 20);
+        few_samples(&b, 20);
+        uint64_t expected[2] = {whole(r, &a), whole(r, &b)}, got[2];
+        CHECK(expected[0] && expected[1]);
+        const struct pen_request *requests[2] = {&a, &b};
+        uint32_t turns = in_turns(r, requests, SHORTEST, got);
+        printf("%s beside %s: %u turns\n", a.technique, b.technique, turns);
+        CHECK(turns > 8);
+        CHECK(got[0] == expected[0]);
+        CHECK(got[1] == expected[1]);
+    }
+}
+
+/* Given up after few and after many turns. */
+static void check_giving_up(struct pen_renderer *r, const uint8_t scene[PEN_ID_BYTES])
+{
+    const struct pen_catalogue *catalogue = pen_renderer_catalogue();
+    for (uint32_t i = 0; i < catalogue->count; i++) {
+        struct pen_request request;
+        fixture_request(&request, scene, catalogue->items[i]->name);
+        few_samples(&request, 40);
+        request.width = 96, request.height = 72;
+        uint64_t expected = whole(r, &request), bytes = gl_targets_bytes();
+        for (uint32_t most = 0; most < 60; most = 2 * most + 1) {
+            struct pen_result result;
+            struct pen_frame frame;
+            struct pen_error error = {0};
+            pen_renderer_drop_shadows(r);
+            struct pen_render *render = pen_render_begin(r, &request, &frame, &result, &error);
+            bool ended = false;
+            for (uint32_t turn = 0; turn < most && !ended; turn++)
+                ended = pen_render_advance(render, SHORTEST);
+            bool ok = pen_render_end(render, &error);
+            CHECK(ok == ended);
+            if (!ok)
+                CHECK(error.code == PEN_LOST && !frame.plane_count);
+            pen_frame_finish(&frame);
+        }
+        CHECK(gl_targets_bytes() == bytes);
+        CHECK(whole(r, &request) == expected);
+    }
+}
+
+int main(void)
+{
+    struct pen_error error;
+    check_fiber();
+    struct pen_renderer *r = fixture_renderer(PEN_DEVICE_AUTO, 0, &error);
+    if (!r) {
+        fprintf(stderr, "skipped: %s\n", error.message);
+        return 77;
+    }
+    uint8_t scenes[2][PEN_ID_BYTES];
+    fixture_scene(r, PEN_GENERATED_DEMO, 0, 1, scenes[0]);
+    fixture_scene(r, PEN_GENERATED_PLANAR_MASK, 0, 1, scenes[1]);
+    check_methods(r, scenes);
+    check_giving_up(r, scenes[1]);
+    pen_renderer_destroy(r);
+    CHECK(gl_targets_bytes() == 0);
+    CHECK_DONE();
+}

@@ -291,10 +291,12 @@ static bool render_jittered(struct frame *f, uint32_t number, struct pen_error *
 
 /* What faces the lights squarely comes out just below white, with the sky's share on top. The key
  * light is made to measure: its level is 1. */
-static void choose_exposure(struct frame *f, bool own_light)
+static void choose_exposure(struct frame *f, bool scenes_own)
 {
     struct pen_request *r = f->job->request;
-    float level = own_light ? 1 : light_meter(f->lights, f->light_count, f->job->scene);
+    const struct scene *scene = f->job->scene;
+    bool key_light = scenes_own && !scene->blob.light_count;
+    float level = key_light ? 1 : light_meter(f->lights, f->light_count, scenes_own, scene);
     if (r->exposure_ev == PEN_AUTO)
         r->exposure_ev = glm_clamp(log2f(0.72f / level), -24, 24);
     if (r->sky_level == PEN_AUTO)
@@ -312,9 +314,9 @@ bool frame_render(const struct frame_job *job, struct pen_frame *frame, struct p
     shadow_cache_begin_frame(job->ctx);
     if (!view_resolve(&f.view, &r->camera, job->scene, r->width, r->height, error))
         return false;
-    bool own_light = !r->lights_given && !job->scene->blob.light_count;
+    bool scenes_own = !r->lights_given;
     f.light_count = lights_resolve(f.lights, r, job->scene, &f.view, result);
-    choose_exposure(&f, own_light);
+    choose_exposure(&f, scenes_own);
     uint32_t faces = 1;
     for (uint32_t i = 0; i < f.light_count; i++)
         faces += f.lights[i].face_count;

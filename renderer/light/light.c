@@ -339,15 +339,23 @@ static void make_cube(struct light *light, const struct scene *scene)
     }
 }
 
-static void make_light(
-    struct light *light, const struct pen_light *source, const struct scene *scene)
+void light_emission(struct light *light, const struct pen_light *source, const struct scene *scene)
 {
+    float direction[3];
     memset(light, 0, sizeof *light);
     light->source = source;
     set_radiance(light);
-    float direction[3], center[3], radius = scene_radius(scene);
-    scene_center(scene, center);
     scene_point_in(scene, source->position, light->origin);
+    scene_direction(source->position, source->target, direction);
+    make_axes(direction, source->up, light->x, light->y, light->z);
+}
+
+static void make_light(
+    struct light *light, const struct pen_light *source, const struct scene *scene)
+{
+    float direction[3], center[3], radius = scene_radius(scene);
+    light_emission(light, source, scene);
+    scene_center(scene, center);
     bool round = source->type == PEN_LIGHT_POINT || source->type == PEN_LIGHT_SPHERE;
     if (round)
         scene_direction((double[3]){light->origin[0], light->origin[1], light->origin[2]},

@@ -23,6 +23,9 @@ struct light {
 uint32_t lights_resolve(struct light lights[PEN_MAX_LIGHTS], struct pen_request *request,
     const struct scene *scene, const struct view *view, struct pen_result *result);
 
+/* Only `source`, `radiance`, `origin` and, where it has a direction, `z`. */
+void light_emission(struct light *light, const struct pen_light *source, const struct scene *scene);
+
 /* Matrix from light space to the clip space of the face's map (0 <= z <= w, near first), seen from
  * the light point `sample` (x, y on the emitter) with window `rect`. */
 void light_face_clip(

@@ -48,22 +48,38 @@ static int ascending(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-float light_meter(const struct light *lights, uint32_t count, const struct scene *scene)
+/* 0: no light reaches anything. */
+static float measure(
+    const struct light *lights, uint32_t count, const struct outline_samples *samples)
 {
-    const struct outline *o = &scene->outline;
     float found[OUTLINE_SAMPLES], most = 0;
-    for (uint32_t i = 0; i < o->sample_count; i++) {
+    for (uint32_t i = 0; i < samples->count; i++) {
         found[i] = 0;
         for (uint32_t k = 0; k < count; k++)
-            found[i] += irradiance(&lights[k], o->samples[i].point, o->samples[i].normal);
+            found[i] += irradiance(&lights[k], samples->at[i].point, samples->at[i].normal);
         most = fmaxf(most, found[i]);
     }
     if (!(most > 0) || !isfinite(most))
-        return 1;
-    qsort(found, o->sample_count, sizeof *found, ascending);
+        return 0;
+    qsort(found, samples->count, sizeof *found, ascending);
     uint32_t dark = 0; /* not reached: outside a cone, behind an emitter */
     while (found[dark] < 1e-3f * most)
         dark++;
-    uint32_t lit = o->sample_count - dark;
+    uint32_t lit = samples->count - dark;
     return 4.0f / 3 * found[dark + (lit - 1) * 4 / 5] / GLM_PIf;
+}
+
+float light_meter(
+    const struct light *lights, uint32_t count, bool scenes_own, const struct scene *scene)
+{
+    float level = 0;
+    for (uint32_t i = 0; i < scene->stage->moment_count; i++) {
+        const struct scene_moment *moment = &scene->stage->moments[i];
+        struct light moved[PEN_MAX_LIGHTS];
+        for (uint32_t k = 0; scenes_own && k < moment->light_count; k++)
+            light_emission(&moved[k], &moment->lights[k], scene);
+        level = fmaxf(level, scenes_own ? measure(moved, moment->light_count, &moment->samples)
+                                        : measure(lights, count, &moment->samples));
+    }
+    return level > 0 ? level : 1;
 }

@@ -31,13 +31,15 @@ static double turn_normal(const double m[12], const double n[3], double out[3])
     return determinant;
 }
 
-static void skin_vertex(const struct pose *pose, const struct psc_influence *influences,
-    uint32_t count, struct vertex *v, int *sides)
+static void skin_vertex(const struct pose *pose, const double (*joints)[12],
+    const struct psc_influence *influences, uint32_t count, struct vertex *v, int *sides)
 {
-    double m[12] = {0};
+    double m[12] = {0}, sum = 0;
     struct vertex out;
+    for (uint32_t i = 0; i < count; i++)
+        sum += influences[i].weight; /* not quite 1, which far from the origin is seen */
     for (uint32_t i = 0; i < count; i++) {
-        const double *joint = pose->joints[influences[i].joint], weight = influences[i].weight;
+        const double *joint = joints[influences[i].joint], weight = influences[i].weight / sum;
         for (int k = 0; weight > 0 && k < 12; k++)
             m[k] += weight * joint[k];
     }
@@ -116,30 +118,33 @@ static void find_bounds(struct pose *pose, struct psc_primitive *p)
     }
 }
 
-/* The joints' matrices into pose->joints; true when they, or the weights, are not those of last
- * time. */
-static bool inputs_changed(struct pose *pose, uint32_t number)
+void pose_place_joints(struct pose *pose)
 {
     const struct psc_motion *m = &pose->rest->motion;
-    const struct psc_deform *d = &m->deforms[number];
-    struct pose_deform_state *state = &pose->deforms[number];
-    size_t joint_bytes = 0, weight_bytes = d->target_count * sizeof *state->weights;
-    if (d->skin >= 0) {
-        const struct psc_skin *skin = &m->skins[d->skin];
-        joint_bytes = skin->joint_count * sizeof *state->joints;
-        for (uint32_t i = 0; i < skin->joint_count; i++) {
-            const struct psc_joint *joint = &m->joints[skin->first_joint + i];
-            double inverse[12];
+    for (uint32_t s = 0; s < m->skin_count; s++) {
+        pose->skin_moved[s] = false;
+        for (uint32_t i = 0; i < m->skins[s].joint_count; i++) {
+            uint32_t number = m->skins[s].first_joint + i;
+            double inverse[12], placed[12];
             for (int k = 0; k < 12; k++)
-                inverse[k] = joint->inverse_bind[k];
-            psc_affine_multiply(pose->worlds[joint->node], inverse, pose->joints[i]);
+                inverse[k] = m->joints[number].inverse_bind[k];
+            psc_affine_multiply(pose->worlds[m->joints[number].node], inverse, placed);
+            pose->skin_moved[s] |= memcmp(placed, pose->joints[number], sizeof placed) != 0;
+            memcpy(pose->joints[number], placed, sizeof placed);
         }
     }
+}
+
+/* Whether joints or weights are not those of last time. */
+static bool inputs_changed(struct pose *pose, uint32_t number)
+{
+    const struct psc_deform *d = &pose->rest->motion.deforms[number];
+    struct pose_deform_state *state = &pose->deforms[number];
     const float *weights = pose->weights + d->first_weight;
-    if (state->made && !memcmp(state->joints, pose->joints, joint_bytes) &&
+    size_t weight_bytes = d->target_count * sizeof *weights;
+    if (state->made && !(d->skin >= 0 && pose->skin_moved[d->skin]) &&
         !memcmp(state->weights, weights, weight_bytes))
         return false;
-    memcpy(state->joints, pose->joints, joint_bytes);
     memcpy(state->weights, weights, weight_bytes);
     state->made = true;
     return true;
@@ -193,14 +198,13 @@ bool pose_deform(struct pose *pose, uint32_t number, uint32_t *changes)
         load(&vertices[i], &m->binds[d->first_bind + i]);
     morph(vertices, m, d, pose->weights);
     for (uint32_t i = 0; d->skin >= 0 && i < p->vertex_count; i++)
-        skin_vertex(pose, m->influences + d->first_influence + (size_t)i * d->influences,
-            d->influences, &vertices[i], &sides);
+        skin_vertex(pose, (const double(*)[12])pose->joints + m->skins[d->skin].first_joint,
+            m->influences + d->first_influence + (size_t)i * d->influences, d->influences,
+            &vertices[i], &sides);
     bool fits = store(pose, d, p, vertices, sides < 0);
     free(vertices);
-    if (!fits) {
-        pose->deforms[number].made = false;
+    if (!fits)
         return false;
-    }
     if (d->skin >= 0)
         place_instance(pose, (uint32_t)d->instance, sides < 0, changes);
     if (d->flags & PSC_DEFORM_FLAT)

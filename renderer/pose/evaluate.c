@@ -18,17 +18,17 @@ static uint32_t find_key(const float *times, uint32_t count, float time_s)
     return low;
 }
 
-static void normalize(float *q)
+static void normalize(double *q)
 {
     double square = 0;
     for (int i = 0; i < 4; i++)
-        square += (double)q[i] * q[i];
+        square += q[i] * q[i];
     for (int i = 0; i < 4 && square > 0; i++)
-        q[i] = (float)(q[i] / sqrt(square));
+        q[i] /= sqrt(square);
 }
 
 /* Appendix C.4; nearly equal rotations are mixed linearly, which differs by less than rounding. */
-static void slerp(const float *from, const float *to, double t, float *out)
+static void slerp(const float *from, const float *to, double t, double *out)
 {
     double a[4], b[4], dot = 0, sum_a = 0, sum_b = 0;
     for (int i = 0; i < 4; i++) {
@@ -47,23 +47,23 @@ static void slerp(const float *from, const float *to, double t, float *out)
         v = sin(angle * t) / sine;
     }
     for (int i = 0; i < 4; i++)
-        out[i] = (float)(u * a[i] + side * v * b[i]);
+        out[i] = u * a[i] + side * v * b[i];
     normalize(out);
 }
 
 /* Appendix C.5. `values`: of the key before; 3 * components for each key. */
-static void cubic(const float *values, uint32_t components, double t, double span, float *out)
+static void cubic(const float *values, uint32_t components, double t, double span, double *out)
 {
     const float *value = values + components, *leave = values + 2 * (size_t)components;
     const float *arrive = values + 3 * (size_t)components, *next = arrive + components;
     double t2 = t * t, t3 = t2 * t;
     for (uint32_t i = 0; i < components; i++)
-        out[i] = (float)((2 * t3 - 3 * t2 + 1) * value[i] + span * (t3 - 2 * t2 + t) * leave[i] +
-                         (-2 * t3 + 3 * t2) * next[i] + span * (t3 - t2) * arrive[i]);
+        out[i] = (2 * t3 - 3 * t2 + 1) * value[i] + span * (t3 - 2 * t2 + t) * leave[i] +
+                 (-2 * t3 + 3 * t2) * next[i] + span * (t3 - t2) * arrive[i];
 }
 
 void pose_sample(const struct psc_motion *motion, const struct psc_sampler *s, float time_s,
-    bool rotation, float *out)
+    bool rotation, double *out)
 {
     const float *times = motion->keys + s->first_time;
     uint32_t key = time_s <= times[0] ? 0 : find_key(times, s->key_count, time_s);
@@ -72,21 +72,23 @@ void pose_sample(const struct psc_motion *motion, const struct psc_sampler *s, f
     bool held = time_s <= times[0] || key + 1 == s->key_count;
     double span = held ? 1 : (double)times[key + 1] - times[key];
     double t = held ? 0 : ((double)time_s - times[key]) / span;
+    bool cubic_held = held && s->interpolation == PSC_CUBIC;
     if (held || s->interpolation == PSC_STEP)
-        memcpy(out, s->interpolation == PSC_CUBIC ? values + s->components : values,
-            s->components * sizeof *out);
+        for (uint32_t i = 0; i < s->components; i++)
+            out[i] = values[i + (cubic_held ? s->components : 0)];
     else if (s->interpolation == PSC_CUBIC)
         cubic(values, s->components, t, span, out);
     else if (rotation)
         slerp(values, values + 4, t, out);
     else
         for (uint32_t i = 0; i < s->components; i++)
-            out[i] = (float)((1 - t) * values[i] + t * values[s->components + i]);
+            out[i] = (1 - t) * values[i] + t * values[s->components + i];
     if (rotation)
         normalize(out);
 }
 
-/* Where a channel writes; NULL: not one float after the other. */
+/* Where a channel writes; NULL: not one float after the other. Translations stay in full: far from
+ * the origin a float is coarse. */
 static float *place_of(struct pose *pose, const struct psc_channel *c)
 {
     uint32_t i = c->item;
@@ -153,15 +155,17 @@ void pose_apply_channels(struct pose *pose, const struct psc_animation *animatio
         const struct psc_channel *c = &m->channels[animation->first_channel + i];
         const struct psc_sampler *s = &m->samplers[c->sampler];
         pose_sample(m, s, time_s, c->target == PSC_TO_NODE_ROTATION, pose->channel_values);
-        float *place = place_of(pose, c), *values = pose->channel_values;
+        float *place = place_of(pose, c);
+        const double *values = pose->channel_values;
         if (place)
-            memcpy(place, values, s->components * sizeof *values);
+            for (uint32_t k = 0; k < s->components; k++)
+                place[k] = (float)values[k];
         else if (c->target == PSC_TO_NODE_TRANSLATION)
             for (int k = 0; k < 3; k++)
                 pose->nodes[c->item].translation[k] = values[k];
         else if (c->target == PSC_TO_CAMERA_FOV)
-            pose->cameras[c->item].fov_y_deg = pose_fov_y_deg(values[0]);
-        else if (values[0] > 0.5f)
+            pose->cameras[c->item].fov_y_deg = pose_fov_y_deg((float)values[0]);
+        else if (values[0] > 0.5)
             pose->nodes[c->item].flags &= ~(uint32_t)PSC_NODE_HIDDEN;
         else
             pose->nodes[c->item].flags |= PSC_NODE_HIDDEN;

@@ -4,7 +4,6 @@
 #include "renderer/blob/affine.h"
 
 struct pose_deform_state { /* what a primitive was last made of */
-    double (*joints)[12];
     float *weights;
     bool made;
 };
@@ -19,12 +18,13 @@ struct pose {
     float *weights;
     struct psc_material_rest *material_rests;
     struct psc_light_rest *light_rests;
-    float (*alphas)[8];    /* of material_rests: factor, cutoff, the base texture's placement */
-    float *channel_values; /* of one channel */
+    float (*alphas)[8];     /* of material_rests: factor, cutoff, the base texture's placement */
+    double *channel_values; /* of one channel */
 
     double (*worlds)[12]; /* of nodes */
     bool *hidden;
-    double (*joints)[12]; /* of one skin */
+    double (*joints)[12]; /* of all skins */
+    bool *skin_moved;     /* since the last pose */
 
     float (*positions)[3];
     struct psc_attributes *attributes;
@@ -43,9 +43,11 @@ struct pose {
 
 /* evaluate.c: one sampler at a time; `rotation`: as a quaternion. */
 void pose_sample(const struct psc_motion *motion, const struct psc_sampler *sampler, float time_s,
-    bool rotation, float *out);
+    bool rotation, double *out);
 /* Writes every channel's value where it belongs, the materials among them. */
 void pose_apply_channels(struct pose *pose, const struct psc_animation *animation, float time_s);
 
-/* deform.c: false when a vertex leaves the range of coordinates. */
+/* deform.c: the joints of all skins. */
+void pose_place_joints(struct pose *pose);
+/* False when a vertex leaves the range of coordinates. */
 bool pose_deform(struct pose *pose, uint32_t number, uint32_t *changes);

@@ -18,14 +18,6 @@ static void *copy(const void *from, size_t count, size_t item_bytes)
     return to;
 }
 
-static uint32_t most_joints(const struct psc_motion *m)
-{
-    uint32_t most = 0;
-    for (uint32_t i = 0; i < m->skin_count; i++)
-        most = m->skins[i].joint_count > most ? m->skins[i].joint_count : most;
-    return most;
-}
-
 static uint32_t most_components(const struct psc_motion *m)
 {
     uint32_t most = 4;
@@ -41,8 +33,6 @@ static void create_deforms(struct pose *pose)
     pose->moved = copy(NULL, m->deform_count, sizeof *pose->moved);
     for (uint32_t i = 0; i < m->deform_count; i++) {
         const struct psc_deform *d = &m->deforms[i];
-        uint32_t joints = d->skin >= 0 ? m->skins[d->skin].joint_count : 0;
-        pose->deforms[i].joints = copy(NULL, joints, sizeof *pose->deforms[i].joints);
         pose->deforms[i].weights = copy(NULL, d->target_count, sizeof *pose->deforms[i].weights);
     }
 }
@@ -78,7 +68,8 @@ struct pose *pose_create(const struct psc_scene *rest)
     pose->channel_values = copy(NULL, most_components(m), sizeof *pose->channel_values);
     pose->worlds = copy(NULL, m->node_count, sizeof *pose->worlds);
     pose->hidden = copy(NULL, m->node_count, sizeof *pose->hidden);
-    pose->joints = copy(NULL, most_joints(m), sizeof *pose->joints);
+    pose->joints = copy(NULL, m->joint_count, sizeof *pose->joints);
+    pose->skin_moved = copy(NULL, m->skin_count, sizeof *pose->skin_moved);
     if (m->deform_count) { /* else no vertex moves */
         pose->positions = copy(rest->positions, rest->vertex_count, sizeof *pose->positions);
         pose->attributes = copy(rest->attributes, rest->vertex_count, sizeof *pose->attributes);
@@ -111,15 +102,13 @@ void pose_destroy(struct pose *pose)
 {
     if (!pose)
         return;
-    for (uint32_t i = 0; i < pose->rest->motion.deform_count; i++) {
-        free(pose->deforms[i].joints);
+    for (uint32_t i = 0; i < pose->rest->motion.deform_count; i++)
         free(pose->deforms[i].weights);
-    }
     void *const owned[] = {pose->nodes, pose->weights, pose->material_rests, pose->light_rests,
         pose->alphas, pose->channel_values, pose->worlds, pose->hidden, pose->joints,
-        pose->positions, pose->attributes, pose->meshlets, pose->primitives, pose->instances,
-        pose->shown, pose->materials, pose->lights, pose->cameras, pose->instance_bounds,
-        pose->instance_dirty, pose->deforms, pose->moved};
+        pose->skin_moved, pose->positions, pose->attributes, pose->meshlets, pose->primitives,
+        pose->instances, pose->shown, pose->materials, pose->lights, pose->cameras,
+        pose->instance_bounds, pose->instance_dirty, pose->deforms, pose->moved};
     for (size_t i = 0; i < sizeof owned / sizeof *owned; i++)
         free(owned[i]);
     free(pose);
@@ -343,8 +332,12 @@ bool pose_set(
     for (uint32_t i = 0; i < m->light_rest_count; i++)
         pose_light_power(&pose->lights[pose->light_rests[i].light].light, &pose->light_rests[i]);
     fits = find_worlds(pose) && place_riders(pose, changes);
+    if (fits)
+        pose_place_joints(pose);
     for (uint32_t i = 0; fits && i < m->deform_count; i++)
         fits = pose_deform(pose, i, changes);
+    for (uint32_t i = 0; !fits && i < m->deform_count; i++)
+        pose->deforms[i].made = false; /* nobody knows of which pose */
     *changes |= POSE_LIGHTS;
     mark_moved(pose);
     show_instances(pose);
@@ -370,4 +363,11 @@ const uint32_t *pose_moved(const struct pose *pose, uint32_t *count)
 const struct psc_instance *pose_instances(const struct pose *pose)
 {
     return pose->instances;
+}
+
+void pose_instance_bounds(const struct pose *pose, float (*bounds)[2][3])
+{
+    for (uint32_t i = 0; i < pose->rest->instance_count; i++)
+        if (!(pose->instances[i].flags & PSC_HIDDEN))
+            memcpy(bounds++, pose->instance_bounds[i], sizeof *bounds);
 }

@@ -39,3 +39,6 @@ const uint32_t *pose_moved(const struct pose *pose, uint32_t *count);
 
 /* All instances, as the blob counts them, hidden ones flagged. */
 const struct psc_instance *pose_instances(const struct pose *pose);
+
+/* World bounds of the instances of pose_scene. */
+void pose_instance_bounds(const struct pose *pose, float (*bounds)[2][3]);

@@ -32,13 +32,14 @@ static void direction(uint32_t i, float d[3])
     d[0] = r * cosf(turn), d[1] = z, d[2] = r * sinf(turn);
 }
 
-static void find_extremes(struct outline *o, const struct psc_scene *s, const float (*content)[3])
+void outline_grow(struct outline *o, const struct psc_scene *s, const float (*content)[3])
 {
-    float directions[OUTLINE_DIRECTIONS][3], far[OUTLINE_DIRECTIONS];
-    bool any = false;
+    float directions[OUTLINE_DIRECTIONS][3];
+    bool any = o->extreme_count > 0;
     for (uint32_t i = 0; i < OUTLINE_DIRECTIONS; i++) {
         direction(i, directions[i]);
-        far[i] = -INFINITY;
+        if (!any)
+            o->along[i] = -INFINITY;
     }
     uint32_t step = s->vertex_count / MOST_VERTICES + 1;
     for (uint32_t n = 0; n < s->instance_count; n++) {
@@ -52,8 +53,8 @@ static void find_extremes(struct outline *o, const struct psc_scene *s, const fl
             for (uint32_t i = 0; i < OUTLINE_DIRECTIONS; i++) {
                 const float *d = directions[i];
                 float along = at[0] * d[0] + at[1] * d[1] + at[2] * d[2];
-                if (along > far[i]) {
-                    far[i] = along;
+                if (along > o->along[i]) {
+                    o->along[i] = along;
                     memcpy(o->extremes[i], at, sizeof at);
                 }
             }
@@ -82,7 +83,7 @@ static float area_normal(const struct psc_scene *s, const struct psc_instance *i
 
 /* Walks over (some of) the triangles inside. With `samples`, takes one whenever another `stride` of
  * area has gone by; returns the area. */
-static double walk(struct outline *o, const struct psc_scene *s, const float (*content)[3],
+static double walk(struct outline_samples *o, const struct psc_scene *s, const float (*content)[3],
     bool take, double stride)
 {
     uint64_t step = s->header->triangles / MOST_TRIANGLES + 1, at = 0;
@@ -97,20 +98,20 @@ static double walk(struct outline *o, const struct psc_scene *s, const float (*c
             if (!is_inside(center, content))
                 continue;
             area += one;
-            for (; take && next < area && o->sample_count < OUTLINE_SAMPLES; next += stride) {
-                memcpy(o->samples[o->sample_count].point, center, sizeof center);
-                memcpy(o->samples[o->sample_count++].normal, normal, sizeof normal);
+            for (; take && next < area && o->count < OUTLINE_SAMPLES; next += stride) {
+                memcpy(o->at[o->count].point, center, sizeof center);
+                memcpy(o->at[o->count++].normal, normal, sizeof normal);
             }
         }
     }
     return area;
 }
 
-void outline_make(struct outline *o, const struct psc_scene *scene, const float (*content)[3])
+void outline_sample(
+    struct outline_samples *samples, const struct psc_scene *scene, const float (*content)[3])
 {
-    memset(o, 0, sizeof *o);
-    find_extremes(o, scene, content);
-    double area = walk(o, scene, content, false, 0);
+    samples->count = 0;
+    double area = walk(samples, scene, content, false, 0);
     if (area > 0)
-        walk(o, scene, content, true, area / OUTLINE_SAMPLES);
+        walk(samples, scene, content, true, area / OUTLINE_SAMPLES);
 }

@@ -6,17 +6,22 @@
 #define OUTLINE_DIRECTIONS 146
 #define OUTLINE_SAMPLES 192
 
+/* World: the vertices farthest along as many directions. */
 struct outline {
-    float extremes[OUTLINE_DIRECTIONS]
-                  [3]; /* world: the vertices farthest along as many directions */
-    uint32_t extreme_count;
-    struct {
-        float point[3],
-            normal[3];          /* world; the normal is unit length, its sign that of the winding */
-    } samples[OUTLINE_SAMPLES]; /* spread evenly over the area */
-    uint32_t sample_count;
+    float extremes[OUTLINE_DIRECTIONS][3], along[OUTLINE_DIRECTIONS];
+    uint32_t extreme_count; /* all, or 0 */
 };
 
-/* Of what of the scene lies inside the world bounds `content`. */
-void outline_make(
+/* Spread evenly over the area; normals are unit length, their sign that of the winding. */
+struct outline_samples {
+    struct {
+        float point[3], normal[3];
+    } at[OUTLINE_SAMPLES];
+    uint32_t count;
+};
+
+/* By what of the scene lies inside the world bounds `content`; a zeroed outline is empty. */
+void outline_grow(
     struct outline *outline, const struct psc_scene *scene, const float (*content)[3]);
+void outline_sample(
+    struct outline_samples *samples, const struct psc_scene *scene, const float (*content)[3]);

@@ -268,6 +268,7 @@ static struct scene *open_file(struct scene *s, struct pen_error *error)
     uint32_t changes;
     s->blob = s->file;
     s->pose = (struct scene_pose){-1, 0};
+    s->moving_animation = -1;
     for (uint32_t i = 0; i < s->file.instance_count && !s->poses; i++)
         if (s->file.instances[i].flags & PSC_HIDDEN)
             s->poses = pose_create(&s->file);
@@ -353,6 +354,8 @@ void scene_destroy(struct scene *s)
     free(s->groups);
     free(s->command_room);
     pose_destroy(s->poses);
+    stage_finish(&s->rest_stage);
+    stage_finish(&s->moving_stage);
     psc_close(&s->file);
     free(s);
 }
@@ -383,8 +386,7 @@ static void follow_pose(struct scene *s, uint32_t changes)
         make_groups(s);
     if (changes & POSE_MATERIALS)
         upload_materials(s);
-    if (changes & (POSE_VERTICES | POSE_INSTANCES | POSE_STATE))
-        scene_measure(s);
+    scene_measure(s);
     s->moved += (changes & (POSE_VERTICES | POSE_INSTANCES)) != 0;
     s->remade += (changes & (POSE_STATE | POSE_ALPHA)) != 0;
 }

@@ -2,7 +2,7 @@
 #pragma once
 #include "renderer/blob/pscene.h"
 #include "renderer/scene/cull.h"
-#include "renderer/scene/outline.h"
+#include "renderer/scene/stage.h"
 #include "renderer/gl/program.h"
 #include "renderer/gl/texture.h"
 
@@ -51,8 +51,9 @@ struct scene {
     uint32_t group_count;
     struct cull_command *command_room;
     float (*instance_bounds)[2][3]; /* world */
-    float content[2][3];    /* world bounds without a flat floor that everything stands on */
-    struct outline outline; /* of the content */
+    struct scene_stage rest_stage, moving_stage;
+    int32_t moving_animation;        /* that moving_stage is of; -1: none yet */
+    const struct scene_stage *stage; /* one of the two */
     bool has_emission, has_unlit;
     bool has_gloss; /* some roughness is below 0.5 */
     uint64_t bytes;
@@ -82,11 +83,11 @@ bool scene_set_pose(
     struct scene *scene, const char *animation, float time_s, struct pen_error *error);
 /* measure.c: of the scene as posed, once it is; everything below follows from it. */
 void scene_measure(struct scene *scene);
-/* What a ground lies under, m: the bounds' lowest point, now or at rest. */
+/* What a ground lies under, m: the stage's lowest point, or that of the rest pose. */
 float scene_floor(const struct scene *scene);
 
 bool scene_is_empty(const struct scene *scene);
-/* Of the sphere around the content, m; >= 1e-9. Cameras and lights are chosen to suit it: a floor
+/* Of the sphere around the stage, m; >= 1e-9. Cameras and lights are chosen to suit it: a floor
  * may be any size. */
 float scene_radius(const struct scene *scene);
 void scene_center(const struct scene *scene, float center[3]);

@@ -73,10 +73,10 @@ static struct framing collect(
     const struct scene *scene, const float center[3], const float axes[3][3], bool all_round)
 {
     const uint32_t turns = all_round ? TURNS : 1;
-    struct framing f = {.count = scene->outline.extreme_count * turns};
+    struct framing f = {.count = scene->stage->outline.extreme_count * turns};
     f.points = pen_alloc_zero(f.count, sizeof *f.points);
     for (uint32_t n = 0; n < f.count; n++) {
-        const float *from = scene->outline.extremes[n / turns];
+        const float *from = scene->stage->outline.extremes[n / turns];
         float angle = 2 * GLM_PIf * (float)(n % turns) / (float)turns;
         float x = from[0] - center[0], z = from[2] - center[2];
         float p[3] = {x * cosf(angle) + z * sinf(angle), from[1] - center[1],
@@ -96,7 +96,7 @@ static void frame_content(struct pen_camera *c, const struct scene *scene, float
     float axes[3][3] = {{cosf(azimuth), 0, -sinf(azimuth)},
         {-sinf(azimuth) * sinf(elevation), cosf(elevation), -cosf(azimuth) * sinf(elevation)},
         {sinf(azimuth) * cosf(elevation), sinf(elevation), cosf(azimuth) * cosf(elevation)}};
-    if (distance <= 0 && scene->outline.extreme_count) {
+    if (distance <= 0 && scene->stage->outline.extreme_count) {
         struct framing f =
             collect(scene, center, (const float(*)[3])axes, c->mode == PEN_CAMERA_ORBIT);
         distance = fmaxf(framing_distance(&f, 0, tan_y * aspect), framing_distance(&f, 1, tan_y));
@@ -148,8 +148,9 @@ bool view_resolve(struct view *v, struct pen_camera *c, const struct scene *scen
     glm_vec3_normalize(v->right);
     glm_vec3_cross(v->right, v->forward, v->up);
     v->fov_y_rad = glm_rad(c->fov_y_deg);
-    /* Depth is reversed and infinite: a small near plane costs no precision. */
-    v->near_z = 1e-3f * scene_radius(scene);
+    /* Depth is reversed and infinite: a small near plane costs no precision. As a power of two it
+     * does not change what depths are rounded to, so a scene is the same picture in another's room. */
+    v->near_z = exp2f(floorf(log2f(1e-3f * scene_radius(scene))));
     make_matrices(v, 0, 0);
     return true;
 }

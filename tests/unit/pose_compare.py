@@ -84,14 +84,21 @@ def compare(dump, path, name):
 
 
 def shared_files():
+    """Those beside the checkout that the evaluation can read, which knows nothing compressed."""
     root = os.environ.get("PENUMBRA_SHARED") or os.path.join(
         os.path.dirname(os.path.abspath(__file__)), "../../../shared")
-    folder = os.path.join(root, "scenes/real")
-    if not os.path.isdir(folder):
-        return []
-    with open(os.path.join(folder, "manifest.json")) as manifest:
-        return [(os.path.join(folder, f["file"]), f["file"]) for f in json.load(manifest)
-                if f.get("skins") or f.get("animations")]
+    for folder in ("scenes/real", "cases"):
+        folder = os.path.join(root, folder)
+        for name in sorted(os.listdir(folder)) if os.path.isdir(folder) else []:
+            path = os.path.join(folder, name)
+            try:
+                document = gltf_pose.File(path).json
+            except Exception:  # no glTF, or a broken one
+                continue
+            moves = document.get("skins") or document.get("animations") or any(
+                "targets" in p for m in document.get("meshes", []) for p in m["primitives"])
+            if moves and not document.get("extensionsRequired"):
+                yield path, name
 
 
 def main():

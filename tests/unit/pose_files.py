@@ -103,7 +103,7 @@ def keys(r, count):
     return times
 
 
-def skinned(seed, sets, mirrored=False, normals=True, floor=False):
+def skinned(seed, sets, mirrored=False, normals=True, floor=False, at=(2, 0, -1)):
     """A tube on a chain of joints under a scaled node; the mesh's own node is moved away, which must
     not show. All three interpolations."""
     r, b = random.Random(seed), Builder()
@@ -113,7 +113,7 @@ def skinned(seed, sets, mirrored=False, normals=True, floor=False):
     if normals:
         mesh["attributes"]["NORMAL"] = b.floats("VEC3", given)
     root = b.node(True, children=[], scale=[-1.3 if mirrored else 1.3, 1.3, 1.3],
-                  translation=[2, 0, -1], rotation=unit(r, 4))
+                  translation=list(at), rotation=unit(r, 4))
     chain, parent = [], root
     for i in range(5):
         joint = b.node(translation=[0, 0.4 if i else 0, 0], rotation=[0, 0, 0.05 * i, 1])
@@ -144,7 +144,8 @@ def skinned(seed, sets, mirrored=False, normals=True, floor=False):
         (chain[2], "rotation", times, [unit(r, 4) for _ in range(12)], "CUBICSPLINE"),
         (chain[3], "rotation", times, [unit(r, 4) for _ in times], "STEP"),
         (chain[4], "rotation", times, [unit(r, 4) for _ in times], "LINEAR", True),
-        (root, "translation", times, [[r.random() for _ in range(3)] for _ in times], "LINEAR")])
+        (root, "translation", times, [[a - b + r.random() for a, b in zip(at, (2, 0, -1))]
+                                      for _ in times], "LINEAR")])
     times = keys(r, 3)
     b.animate("grow", [
         (chain[1], "scale", times, [[1 + r.random() for _ in range(3)] for _ in range(9)],
@@ -209,5 +210,6 @@ def all_files():
     yield "skin-8.glb", skinned(2, 2)
     yield "skin-mirrored.glb", skinned(3, 1, mirrored=True)
     yield "skin-flat.glb", skinned(4, 1, normals=False)
+    yield "skin-far.glb", skinned(7, 1, at=(500000, 30, -4000000))
     yield "morph.glb", morphed(5)
     yield "skin-morph.glb", skinned_and_morphed(6)

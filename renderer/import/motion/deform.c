@@ -188,6 +188,10 @@ static bool read_influences(struct imp_context *context, struct deforming *d,
             joints[s].count < g->used_of || weights[s].count < g->used_of)
             return refuse(PEN_INVALID, "accessors", from->joints[s],
                 "the joints or weights of a skin do not suit their use", error);
+        if (joints[s].component != 5121 && joints[s].component != 5123 &&
+            joints[s].component != 5125)
+            return refuse(PEN_INVALID, "accessors", from->joints[s],
+                "the joints of a vertex must be unsigned integers", error);
         joints[s].normalized = false;
     }
     d->influence_count = 4 * sets;

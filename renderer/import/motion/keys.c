@@ -37,6 +37,8 @@ static bool read_times(struct imp_context *context, int32_t accessor, float **ti
             return refuse(accessor, "an animation's times must increase", error);
         twice |= i && (*times)[i] == (*times)[i - 1];
     }
+    if (reader.count && (*times)[0] < 0)
+        imp_warn(context, "Animations have keys before 0 s, which are never reached.");
     if (twice)
         imp_warn(context, "Animations have two keys at one time; the later one counts.");
     return true;

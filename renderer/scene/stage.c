@@ -1,0 +1,98 @@
+#include "renderer/scene/stage.h"
+#include "protocol/memory.h"
+#include "renderer/blob/bounds.h"
+#include "renderer/pose/pose.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define MOST_MOMENTS 24
+#define LEAST_MOMENTS 5
+#define VERTEX_BUDGET 2000000u /* posed, of all moments: some tenths of a second */
+
+static void merge(float to[2][3], const float box[2][3])
+{
+    for (int k = 0; k < 3; k++) {
+        to[0][k] = fminf(to[0][k], box[0][k]);
+        to[1][k] = fmaxf(to[1][k], box[1][k]);
+    }
+}
+
+/* Without what lies flat at the bottom, or below `ground`, where others stand at other moments. */
+static void find_content(const struct psc_scene *scene, const float (*instance_bounds)[2][3],
+    float ground, float content[2][3])
+{
+    const struct psc_header *h = scene->header;
+    float flat = 1e-4f * (h->bounds_max[1] - h->bounds_min[1]);
+    float bottom = fmaxf(h->bounds_min[1], ground) + flat;
+    psc_bounds_clear(content[0], content[1]);
+    for (uint32_t i = 0; i < scene->instance_count; i++)
+        if (instance_bounds[i][1][1] > bottom)
+            merge(content, instance_bounds[i]);
+    if (content[0][1] <= content[1][1]) {
+        content[0][1] = h->bounds_min[1]; /* it stands on that floor */
+        return;
+    }
+    memcpy(content[0], h->bounds_min, sizeof content[0]);
+    memcpy(content[1], h->bounds_max, sizeof content[1]);
+}
+
+static void start(struct scene_stage *stage, uint32_t moments)
+{
+    memset(stage, 0, sizeof *stage);
+    psc_bounds_clear(stage->content[0], stage->content[1]);
+    stage->floor = INFINITY;
+    stage->moments = pen_alloc_zero(moments, sizeof *stage->moments);
+}
+
+static void add_moment(struct scene_stage *stage, const struct psc_scene *scene,
+    const float (*instance_bounds)[2][3], float ground)
+{
+    const struct psc_header *h = scene->header;
+    struct scene_moment *moment = &stage->moments[stage->moment_count++];
+    float content[2][3];
+    moment->light_count = scene->light_count < PEN_MAX_LIGHTS ? scene->light_count : PEN_MAX_LIGHTS;
+    for (uint32_t i = 0; i < moment->light_count; i++)
+        moment->lights[i] = scene->lights[i].light;
+    if (!(h->bounds_min[0] <= h->bounds_max[0]))
+        return;
+    find_content(scene, instance_bounds, ground, content);
+    merge(stage->content, (const float(*)[3])content);
+    stage->floor = fminf(stage->floor, h->bounds_min[1]);
+    outline_grow(&stage->outline, scene, (const float(*)[3])content);
+    outline_sample(&moment->samples, scene, (const float(*)[3])content);
+}
+
+void stage_make(
+    struct scene_stage *stage, const struct psc_scene *scene, const float (*instance_bounds)[2][3])
+{
+    start(stage, 1);
+    add_moment(stage, scene, instance_bounds, -INFINITY);
+}
+
+void stage_make_animated(struct scene_stage *stage, const struct psc_scene *file, int32_t animation)
+{
+    struct pose *pose = pose_create(file);
+    float duration = file->motion.animations[animation].duration_s;
+    bool empty = !(file->header->bounds_min[1] <= file->header->bounds_max[1]);
+    float(*bounds)[2][3] = pen_alloc_zero(file->instance_count, sizeof *bounds);
+    uint32_t count = VERTEX_BUDGET / (file->vertex_count + 1), changes;
+    count = count < LEAST_MOMENTS ? LEAST_MOMENTS : count > MOST_MOMENTS ? MOST_MOMENTS : count;
+    start(stage, count);
+    for (uint32_t i = 0; i < count; i++) {
+        float time_s = duration * (float)i / (float)(count - 1);
+        if (!pose_set(pose, animation, time_s, &changes, NULL))
+            continue;
+        pose_instance_bounds(pose, bounds);
+        add_moment(stage, pose_scene(pose), (const float(*)[2][3])bounds,
+            empty ? -INFINITY : file->header->bounds_min[1]);
+    }
+    free(bounds);
+    pose_destroy(pose);
+}
+
+void stage_finish(struct scene_stage *stage)
+{
+    free(stage->moments);
+    memset(stage, 0, sizeof *stage);
+}

@@ -430,13 +430,14 @@ def animated(times, values, interpolation="LINEAR", kind="VEC3", sampler=None, c
                           **(channel or {})}]}])
 
 
-def skinned(joints=(0, 0, 0, 0) * 3, weights=(1.0, 0, 0, 0) * 3, matrix=None, kind="MAT4", **skin):
+def skinned(joints=(0, 0, 0, 0) * 3, weights=(1.0, 0, 0, 0) * 3, matrix=None, kind="MAT4",
+            component=5123, **skin):
     matrix = matrix or (1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1)
-    extra = (struct.pack("<12f", *weights) + struct.pack("<12H", *joints) +
+    extra = (struct.pack("<12f", *weights, *[0.0] * (12 - len(weights))) + struct.pack("<12H", *joints) +
              struct.pack("<16f", *matrix))
     return moving(extra, [
-        floats("VEC4", weights), {"bufferView": 1, "byteOffset": 48, "componentType": 5123,
-                                  "type": "VEC4", "count": 3},
+        floats("VEC4", weights), {"bufferView": 1, "byteOffset": 48,
+                                  "componentType": component, "type": "VEC4", "count": 3},
         floats(kind, matrix, 72)],
                   primitive={"attributes": {"POSITION": 0, "WEIGHTS_0": 1, "JOINTS_0": 2}},
                   nodes=[{"mesh": 0, "skin": 0}],
@@ -484,6 +485,30 @@ def motions():
     yield "matrix-far.gltf", skinned(matrix=(3e38,) * 16)
     yield "matrix-type.gltf", skinned(kind="VEC4")
     yield "matrices-few.gltf", skinned().replace(b'"joints": [0]', b'"joints": [0, 0]')
+    yield "joint-negative.gltf", gltf(skins=[{"joints": [-1]}])
+    yield "joint-half.gltf", gltf(skins=[{"joints": [0.5]}])
+    yield "joint-text.gltf", gltf(skins=[{"joints": ["0"]}])
+    yield "skin-missing.gltf", skinned(inverseBindMatrices=99)
+    yield "skin-beyond.gltf", moving(nodes=[{"mesh": 0, "skin": 3}])
+    yield "joints-floats.gltf", skinned(component=5126)
+    yield "joints-signed.gltf", skinned(component=5122)
+    yield "weights-few.gltf", skinned(weights=(1.0, 0, 0, 0) * 2)
+    yield "weights-missing.gltf", skinned().replace(b'"WEIGHTS_0": 1', b'"WEIGHTS_0": 77')
+    whole = animated([0, 1, 2], still)
+    yield "sampler-no-input.gltf", whole.replace(b'"input": 1, ', b"")
+    yield "sampler-no-output.gltf", whole.replace(b', "output": 2', b"")
+    yield "sampler-negative.gltf", animated([0, 1, 2], still, sampler={"input": -1})
+    yield "channel-no-target.gltf", animated([0, 1, 2], still, channel={"target": None})
+    yield "rotation-vec3.gltf", animated([0, 1, 2], still, channel={
+        "target": {"node": 0, "path": "rotation"}})
+    yield "times-none.gltf", animated([], still)
+    yield "time-negative.gltf", animated([-1, 0, 1], still)
+    yield "pointer-unknown.gltf", animated([0, 1, 2], still, channel={"target": {
+        "path": "pointer", "extensions": {"KHR_animation_pointer": {"pointer": "/nodes/0/colour"}}}})
+    yield "pointer-beyond.gltf", animated([0, 1, 2], still, channel={"target": {
+        "path": "pointer", "extensions": {"KHR_animation_pointer": {
+            "pointer": "/nodes/99999999999999999999/translation"}}}})
+    yield "time-twice.gltf", animated([0, 1, 1], still)
     yield "target-short.gltf", moving(bytes(12), [floats("VEC3", [], count=1)], primitive={
         "targets": [{"POSITION": 1}]}, nodes=[{"mesh": 0, "weights": [1]}])
     yield "target-nan.gltf", moving(struct.pack("<9f", *[nan] * 9), [floats("VEC3", still)],
@@ -501,7 +526,7 @@ def motions():
 # Broken by the letter, but drawn, with a warning: what they mean is plain, or only an image is lost.
 TOLERATED = frozenset("""accessor-count-zero buffer-longer-than-told image-no-source mime-gif mime-text
     node-root-is-child node-root-twice truncated-image uri-not-base64-told-image uri-short-image
-    version-number""".split())
+    version-number time-negative time-twice times-none pointer-unknown pointer-beyond""".split())
 
 
 def files(tolerated=False):

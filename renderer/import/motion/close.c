@@ -186,6 +186,11 @@ static bool add_animated(
     uint32_t *sampler = &c->samplers[channel->sampler];
     float *last = &c->ends[channel->sampler];
     bool kept = is_kept(c, &aim), known = isfinite(*last) != 0;
+    int32_t input = c->context->motion->source.samplers[channel->sampler].input;
+    if (!c->context->model->accessors[input].count) {
+        imp_warn(c->context, "Animations have channels without keys, which are left out.");
+        return true;
+    }
     if (!kept && !known && !imp_sampler(c->context, channel->sampler, width, NULL, last, error))
         return false;
     if (!kept) {

@@ -187,7 +187,7 @@ static bool check_rests(const struct psc_scene *scene, struct pen_error *error)
     const struct psc_motion *m = &scene->motion;
     for (uint32_t i = 0; i < m->material_rest_count; i++)
         if (m->material_rests[i].material >= scene->material_count ||
-            !all_finite(m->material_rests[i].emissive, 29))
+            !all_finite(m->material_rests[i].emissive, 34))
             return DAMAGED(error, "an animated material is out of range.");
     for (uint32_t i = 0; i < m->light_rest_count; i++)
         if (m->light_rests[i].light >= scene->light_count ||

@@ -105,6 +105,9 @@ struct psc_sampler {
     X(MATERIAL_ALPHA_CUTOFF, 1)                                                                    \
     X(MATERIAL_NORMAL_SCALE, 1)                                                                    \
     X(MATERIAL_OCCLUSION_STRENGTH, 1)                                                              \
+    X(MATERIAL_IOR, 1)                                                                             \
+    X(MATERIAL_SPECULAR_STRENGTH, 1)                                                               \
+    X(MATERIAL_SPECULAR, 3)                                                                        \
     X(TEXTURE_OFFSET, 2)                                                                           \
     X(TEXTURE_ROTATION, 1)                                                                         \
     X(TEXTURE_SCALE, 2)                                                                            \
@@ -138,6 +141,7 @@ struct psc_animation {
 struct psc_material_rest {
     uint32_t material;
     float emissive[3], emissive_strength;
+    float ior, specular_strength, specular[3];
     struct psc_map_rest {
         float offset[2], rotation, scale[2];
     } maps[5]; /* base, surface, normal, occlusion, emission */

@@ -22,7 +22,7 @@ _Static_assert(sizeof(struct psc_bind) == 40, "psc_bind has padding");
 _Static_assert(sizeof(struct psc_delta) == 40, "psc_delta has padding");
 _Static_assert(sizeof(struct psc_animation) == 72, "psc_animation has padding");
 _Static_assert(sizeof(struct psc_sampler) == 20, "psc_sampler has padding");
-_Static_assert(sizeof(struct psc_material_rest) == 120, "psc_material_rest has padding");
+_Static_assert(sizeof(struct psc_material_rest) == 140, "psc_material_rest has padding");
 _Static_assert(sizeof(struct psc_light_rest) == 28, "psc_light_rest has padding");
 _Static_assert(sizeof(struct psc_node) == 160, "psc_node has padding");
 _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "the blob is little-endian");

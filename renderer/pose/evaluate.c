@@ -120,6 +120,12 @@ static float *place_of(struct pose *pose, const struct psc_channel *c)
         return &MATERIAL.normal_scale;
     case PSC_TO_MATERIAL_OCCLUSION_STRENGTH:
         return &MATERIAL.occlusion_strength;
+    case PSC_TO_MATERIAL_IOR:
+        return &REST.ior;
+    case PSC_TO_MATERIAL_SPECULAR_STRENGTH:
+        return &REST.specular_strength;
+    case PSC_TO_MATERIAL_SPECULAR:
+        return REST.specular;
     case PSC_TO_TEXTURE_OFFSET:
         return MAP.offset;
     case PSC_TO_TEXTURE_ROTATION:

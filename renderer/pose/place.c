@@ -31,6 +31,16 @@ void pose_texture_transform(const struct psc_map_rest *map, float transform[6])
     memcpy(transform, finite ? t : identity, sizeof t);
 }
 
+/* KHR_materials_ior and KHR_materials_specular: the reflectance at normal incidence, compared with
+ * the 0.04 of index 1.5, and 25 where everything is reflected. An index of 0 stands for one that is
+ * infinite. */
+static float dielectric(const struct psc_material_rest *rest, int channel)
+{
+    double n = rest->ior, reflectance = n > 0 ? (n - 1) * (n - 1) / ((n + 1) * (n + 1)) : 1;
+    double most = clamp(reflectance * rest->specular[channel], 0, 1);
+    return (float)clamp(most * rest->specular_strength / 0.04, 0, 25);
+}
+
 void pose_finish_material(struct psc_material *m, const struct psc_material_rest *rest)
 {
     struct psc_texture_ref *refs[5] = {
@@ -40,6 +50,8 @@ void pose_finish_material(struct psc_material *m, const struct psc_material_rest
     m->metallic = (float)clamp(m->metallic, 0, 1);
     m->roughness = (float)clamp(m->roughness, 0, 1);
     m->occlusion_strength = (float)clamp(m->occlusion_strength, 0, 1);
+    for (int i = 0; i < 3 && !(m->flags & (uint32_t)PSC_SPECULAR_GLOSSINESS); i++)
+        m->specular[i] = dielectric(rest, i);
     for (int i = 0; i < 3; i++)
         m->emissive[i] = (float)clamp((double)rest->emissive[i] * rest->emissive_strength, 0, 1e9);
     for (int i = 0; i < 5; i++)

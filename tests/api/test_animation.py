@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 import tempfile
+import threading
 import unittest
 
 import harness
@@ -210,7 +211,11 @@ class Animation(unittest.TestCase):
                     "/extensions/KHR_lights_punctual/lights/0/spot/outerConeAngle": [0.9, 0.5, 1.2],
                     "/cameras/0/perspective/yfov": [0.8, 0.6, 1.0],
                     "/materials/0/pbrMetallicRoughness/baseColorFactor":
-                        [[1, 1, 1, 1], [1, 0, 0, 1], [0, 1, 0, 1]]}
+                        [[1, 1, 1, 1], [1, 0, 0, 1], [0, 1, 0, 1]],
+                    "/materials/0/pbrMetallicRoughness/roughnessFactor": [0.3, 0.6, 0.2],
+                    "/materials/0/extensions/KHR_materials_ior/ior": [1.5, 2.5, 1.2],
+                    "/materials/0/extensions/KHR_materials_specular/specularColorFactor":
+                        [[1, 1, 1], [0, 1, 0.5], [1, 0, 1]]}
 
         def lerp(values, time):
             k = 0 if time < times[1] else 1
@@ -229,9 +234,18 @@ class Animation(unittest.TestCase):
             get = lambda pointer, rest: lerp(pointers[pointer], time) if still else rest
             light = "/extensions/KHR_lights_punctual/lights/0/"
             b.json["extensionsUsed"] = ["KHR_lights_punctual", "KHR_animation_pointer",
-                                        "KHR_node_visibility"]
-            b.json["materials"] = [{"pbrMetallicRoughness": {"metallicFactor": 0, "baseColorFactor":
-                get("/materials/0/pbrMetallicRoughness/baseColorFactor", [1, 1, 1, 1])}}]
+                                        "KHR_node_visibility", "KHR_materials_ior",
+                                        "KHR_materials_specular"]
+            b.json["materials"] = [{"pbrMetallicRoughness": {
+                "metallicFactor": 0,
+                "roughnessFactor": get("/materials/0/pbrMetallicRoughness/roughnessFactor", 1),
+                "baseColorFactor": get("/materials/0/pbrMetallicRoughness/baseColorFactor",
+                                       [1, 1, 1, 1])}, "extensions": {
+                "KHR_materials_ior": {"ior": get("/materials/0/extensions/KHR_materials_ior/ior",
+                                                 1.5)},
+                "KHR_materials_specular": {"specularColorFactor": get(
+                    "/materials/0/extensions/KHR_materials_specular/specularColorFactor",
+                    [1, 1, 1])}}}]
             b.json["extensions"] = {"KHR_lights_punctual": {"lights": [
                 {"type": "spot", "intensity": get(light + "intensity", 100),
                  "color": get(light + "color", [1, 1, 1]), "spot": {
@@ -306,6 +320,26 @@ class Animation(unittest.TestCase):
             exposures.add(self.record(moving, {"animation": "fly", "time_s": time,
                                                "technique": "none"})["exposure_ev"])
         self.assertEqual(len(exposures), 1)
+
+    def test_poses_do_not_mix(self):
+        """Asked for at the same time, poses of one scene are what they are alone."""
+        end = self.file.duration(0)
+        asked = [{"animation": "bend", "time_s": end * k / 5, "technique": t} for k in range(6)
+                 for t in ("pcss", "raytraced")]
+        alone = [self.picture(self.id, one).body for one in asked]
+        found = {}
+
+        def ask(first):
+            for k in range(first, len(asked), 4):
+                found[k] = self.picture(self.id, asked[k]).body
+
+        threads = [threading.Thread(target=ask, args=(i,)) for i in range(4)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        for k, body in enumerate(alone):
+            self.assertEqual(found[k], body, asked[k])
 
     def test_times(self):
         """Held at both ends; no time is infinite, negative or not a number."""

@@ -19,8 +19,6 @@ static struct psc_texture_ref texture_ref(
     return ref;
 }
 
-#define STRONGEST 25 /* of 0.04: everything is reflected */
-
 static struct psc_map_rest map_rest(const struct gltf_texture_info *info)
 {
     return (struct psc_map_rest){
@@ -32,6 +30,9 @@ struct psc_material_rest imp_material_rest(const struct gltf_material *from)
     return (struct psc_material_rest){
         .emissive = {from->emissive[0], from->emissive[1], from->emissive[2]},
         .emissive_strength = from->emissive_strength,
+        .ior = from->ior,
+        .specular_strength = from->specular_strength,
+        .specular = {from->specular[0], from->specular[1], from->specular[2]},
         .maps = {map_rest(&from->base), map_rest(&from->surface), map_rest(&from->normal),
             map_rest(&from->occlusion), map_rest(&from->emission)}};
 }
@@ -46,8 +47,7 @@ static struct psc_material convert(struct imp_context *context, const struct glt
     struct psc_material to = psc_material_default();
     memcpy(to.base_color, from->base_color, sizeof to.base_color);
     for (int i = 0; i < 3; i++)
-        to.specular[i] =
-            fminf(fmaxf(from->specular[i], 0), from->specular_glossiness ? 1 : STRONGEST);
+        to.specular[i] = clamp01(from->specular[i]);
     to.metallic = from->metallic;
     to.roughness = from->roughness;
     to.glossiness = clamp01(from->glossiness);

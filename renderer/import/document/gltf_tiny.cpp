@@ -227,21 +227,16 @@ const char *alpha_mode(const std::string &mode)
     return "";
 }
 
-/* KHR_materials_ior and KHR_materials_specular: the reflectance at normal incidence, compared with
- * the 0.04 of index 1.5. An index of 0 stands for one that is infinite. */
-void dielectric(const tinygltf::Material &from, float *factor)
+void dielectric(const tinygltf::Material &from, gltf_material &to)
 {
-    double reflectance = 0.04, strength = 1;
-    if (const tinygltf::Value *index = find(from.extensions, "KHR_materials_ior")) {
-        double n = number(*index, "ior", 1.5);
-        reflectance = n > 0 ? (n - 1) * (n - 1) / ((n + 1) * (n + 1)) : 1;
-    }
+    to.ior = 1.5f;
+    to.specular_strength = to.specular[0] = to.specular[1] = to.specular[2] = 1;
+    if (const tinygltf::Value *index = find(from.extensions, "KHR_materials_ior"))
+        to.ior = static_cast<float>(number(*index, "ior", 1.5));
     if (const tinygltf::Value *specular = find(from.extensions, "KHR_materials_specular")) {
-        strength = number(*specular, "specularFactor", 1);
-        numbers(*specular, "specularColorFactor", factor, 3);
+        to.specular_strength = static_cast<float>(number(*specular, "specularFactor", 1));
+        numbers(*specular, "specularColorFactor", to.specular, 3);
     }
-    for (int i = 0; i < 3; i++)
-        factor[i] = static_cast<float>(std::min(reflectance * factor[i], 1.0) * strength / 0.04);
 }
 
 gltf_material convert(const tinygltf::Material &from)
@@ -255,8 +250,8 @@ gltf_material convert(const tinygltf::Material &from)
     to.emissive_strength = 1;
     to.metallic = static_cast<float>(pbr.metallicFactor);
     to.roughness = static_cast<float>(pbr.roughnessFactor);
-    to.specular[0] = to.specular[1] = to.specular[2] = to.glossiness = 1;
-    dielectric(from, to.specular);
+    to.glossiness = 1;
+    dielectric(from, to);
     to.normal_scale = static_cast<float>(from.normalTexture.scale);
     to.occlusion_strength = static_cast<float>(from.occlusionTexture.strength);
     to.alpha_cutoff = static_cast<float>(from.alphaCutoff);

@@ -62,7 +62,8 @@ struct gltf_texture_info {
 
 struct gltf_material {
     float base_color[4], emissive[3], emissive_strength, metallic, roughness;
-    float specular[3], glossiness; /* F0; else as a multiple of what 1.5 has as index */
+    float specular[3], glossiness; /* F0; else KHR_materials_specular's colour */
+    float specular_strength, ior;
     float normal_scale, occlusion_strength, alpha_cutoff;
     const char *alpha_mode; /* a literal: "OPAQUE", "MASK", "BLEND" or "" */
     bool double_sided, unlit, specular_glossiness;

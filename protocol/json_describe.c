@@ -150,6 +150,14 @@ void pen_scene_write(struct pen_json *json, const char *key, const struct pen_sc
         pen_json_end(json);
     }
     pen_json_end(json);
+    pen_json_array(json, "variants");
+    for (uint32_t i = 0; i < scene->variant_count; i++) {
+        pen_json_object(json, NULL);
+        pen_json_uint(json, "index", i);
+        pen_json_string(json, "name", scene->variants[i].name);
+        pen_json_end(json);
+    }
+    pen_json_end(json);
     write_warnings(json, scene->warnings, scene->warning_bytes);
     pen_json_end(json);
 }

@@ -19,6 +19,10 @@ struct pen_scene_animation {
     char name[PEN_NAME_BYTES]; /* "" when it has none */
 };
 
+struct pen_scene_variant {
+    char name[PEN_NAME_BYTES]; /* "" when it has none */
+};
+
 struct pen_scene_info { /* borrows its arrays */
     uint8_t id[PEN_ID_BYTES];
     uint64_t source_bytes; /* uploaded */
@@ -29,10 +33,11 @@ struct pen_scene_info { /* borrows its arrays */
     uint32_t vertices, primitives, instances, materials, textures, images;
     uint64_t triangles;                  /* over all instances */
     double bounds_min[3], bounds_max[3]; /* m, world; min > max: no geometry */
-    uint32_t camera_count, light_count, animation_count;
+    uint32_t camera_count, light_count, animation_count, variant_count;
     const struct pen_scene_camera *cameras;
     const struct pen_scene_light *lights;
     const struct pen_scene_animation *animations;
+    const struct pen_scene_variant *variants;
     const char *warnings; /* each ended by NUL, one after the other */
     size_t warning_bytes;
 };

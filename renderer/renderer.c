@@ -288,7 +288,7 @@ struct pen_render *pen_render_begin(struct pen_renderer *r, const struct pen_req
     while (strcmp(technique_registry[t]->info.name, request->technique))
         t++;
     scene->last_use = ++r->clock;
-    if (!scene_set_pose(scene, request->animation, request->time_s, error))
+    if (!scene_set_pose(scene, request, error))
         goto fail;
     struct lane *lane = &render->lane;
     if (!lane_make(lane, &r->ctx, (uint32_t)(render - r->renders), error))

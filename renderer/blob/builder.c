@@ -126,12 +126,12 @@ uint32_t psc_builder_add_motion(
     struct psc_builder *builder, enum psc_section_id section, const void *items, uint32_t count)
 {
     static const uint32_t item_bytes[] = {
-#define X(id, name, type) [PSC_##id - PSC_NODES] = sizeof(type),
+#define X(id, name, type) [PSC_##id - PSC_VARIANTS] = sizeof(type),
         PSC_MOTION_SECTIONS(X)
 #undef X
     };
     struct array *array = &builder->sections[section];
-    uint32_t bytes = item_bytes[section - PSC_NODES];
+    uint32_t bytes = item_bytes[section - PSC_VARIANTS];
     uint32_t first = (uint32_t)(array->bytes / bytes);
     append(array, items, (size_t)count * bytes);
     return first;

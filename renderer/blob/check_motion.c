@@ -196,9 +196,24 @@ static bool check_rests(const struct psc_scene *scene, struct pen_error *error)
     return true;
 }
 
+static bool check_variants(const struct psc_scene *scene, struct pen_error *error)
+{
+    const struct psc_motion *m = &scene->motion;
+    for (uint32_t i = 0; i < m->variant_count; i++)
+        if (!memchr(m->variants[i].name, 0, sizeof m->variants[i].name) ||
+            !within(m->variants[i].first_swap, m->variants[i].swap_count, m->swap_count))
+            return DAMAGED(error, "a variant is out of range.");
+    for (uint32_t i = 0; i < m->swap_count; i++)
+        if (m->swaps[i].primitive >= scene->primitive_count ||
+            m->swaps[i].material >= scene->material_count)
+            return DAMAGED(error, "a variant's material is out of range.");
+    return true;
+}
+
 bool psc_check_motion(const struct psc_scene *scene, struct pen_error *error)
 {
     return check_nodes(&scene->motion, error) && check_riders(scene, error) &&
            check_skins(&scene->motion, error) && check_deforms(scene, error) &&
-           check_animations(scene, error) && check_rests(scene, error);
+           check_animations(scene, error) && check_rests(scene, error) &&
+           check_variants(scene, error);
 }

@@ -1,6 +1,7 @@
 /* What moves in a scene blob: nodes, skins, morph targets and the animations that drive them. All
  * of it is empty in a scene without animations; the rest of the blob then is the rest pose, as it
- * always is. renderer/pose computes other poses from it.
+ * always is. renderer/pose computes other poses from it. Variants, too, are kept here: primitives
+ * of other materials, whether anything moves or not.
  *
  * Everything that hangs on nodes is placed by them: world(node) = world(parent) * local(node). */
 #pragma once
@@ -153,8 +154,20 @@ struct psc_light_rest {
     float color[3], intensity, inner_cone, outer_cone;
 };
 
+/* KHR_materials_variants: a run of PSC_SWAPS, of which the first counts for a primitive. */
+struct psc_variant {
+    char name[60]; /* "" when it has none */
+    uint32_t first_swap, swap_count;
+};
+
+struct psc_swap {
+    uint32_t primitive, material; /* what it is made of instead */
+};
+
 /* The sections of all this, in the order of the file, behind every other one. */
 #define PSC_MOTION_SECTIONS(X)                                                                     \
+    X(VARIANTS, variant, struct psc_variant)                                                       \
+    X(SWAPS, swap, struct psc_swap)                                                                \
     X(NODES, node, struct psc_node)                                                                \
     X(RIDERS, rider, struct psc_rider)                                                             \
     X(SKINS, skin, struct psc_skin)                                                                \

@@ -21,6 +21,7 @@ _Static_assert(sizeof(struct psc_deform) == 40, "psc_deform has padding");
 _Static_assert(sizeof(struct psc_bind) == 40, "psc_bind has padding");
 _Static_assert(sizeof(struct psc_delta) == 40, "psc_delta has padding");
 _Static_assert(sizeof(struct psc_animation) == 72, "psc_animation has padding");
+_Static_assert(sizeof(struct psc_variant) == 68, "psc_variant has padding");
 _Static_assert(sizeof(struct psc_sampler) == 20, "psc_sampler has padding");
 _Static_assert(sizeof(struct psc_material_rest) == 140, "psc_material_rest has padding");
 _Static_assert(sizeof(struct psc_light_rest) == 28, "psc_light_rest has padding");

@@ -15,9 +15,9 @@ static void put(struct psc_header *file, enum psc_section_id section, const void
  * any multiple of 64 within the file. */
 static void cut_motion(struct psc_header *file, size_t *bytes)
 {
-    const struct psc_section *last = &file->sections[PSC_WARNINGS];
+    const struct psc_section *last = &file->sections[PSC_SWAPS]; /* what moves lies behind it */
     uint64_t end = last->offset + last->bytes, at = (end + 63) / 64 * 64;
-    if (at > *bytes) /* nothing lies behind the warnings */
+    if (at > *bytes) /* there is nothing */
         return;
     for (int i = PSC_NODES; i < PSC_SECTIONS; i++)
         file->sections[i] = (struct psc_section){at, 0};

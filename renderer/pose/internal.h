@@ -37,6 +37,7 @@ struct pose {
     float (*instance_bounds)[2][3];
     bool *instance_dirty; /* bounds to be found again */
     struct pose_deform_state *deforms;
+    int32_t variant; /* -1: none */
     uint32_t *moved;
     uint32_t moved_count;
 };

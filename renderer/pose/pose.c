@@ -74,12 +74,15 @@ struct pose *pose_create(const struct psc_scene *rest)
         pose->positions = copy(rest->positions, rest->vertex_count, sizeof *pose->positions);
         pose->attributes = copy(rest->attributes, rest->vertex_count, sizeof *pose->attributes);
         pose->meshlets = copy(rest->meshlets, rest->meshlet_count, sizeof *pose->meshlets);
-        pose->primitives = copy(rest->primitives, rest->primitive_count, sizeof *pose->primitives);
         pose->scene.positions = (const float(*)[3])pose->positions;
         pose->scene.attributes = pose->attributes;
         pose->scene.meshlets = pose->meshlets;
+    }
+    if (m->deform_count || m->variant_count) {
+        pose->primitives = copy(rest->primitives, rest->primitive_count, sizeof *pose->primitives);
         pose->scene.primitives = pose->primitives;
     }
+    pose->variant = -1;
     pose->instances = copy(rest->instances, rest->instance_count, sizeof *pose->instances);
     pose->materials = copy(rest->materials, rest->material_count, sizeof *pose->materials);
     pose->lights = copy(rest->lights, rest->light_count, sizeof *pose->lights);
@@ -114,33 +117,49 @@ void pose_destroy(struct pose *pose)
     free(pose);
 }
 
-bool pose_find(
-    const struct psc_scene *scene, const char *text, int32_t *animation, struct pen_error *error)
+/* What a request names: `count` items of `bytes` each that begin with a name. */
+static bool find_named(const void *items, uint32_t count, size_t bytes, const char *text,
+    const char *what, int32_t *found, struct pen_error *error)
 {
-    const struct psc_motion *m = &scene->motion;
-    char *end, list[200] = "";
-    *animation = -1;
+    char *end, list[200] = "", pointer[16];
+    const char *first = items;
+    *found = -1;
     if (!*text)
         return true;
-    for (uint32_t i = 0; i < m->animation_count; i++)
-        if (!strcmp(m->animations[i].name, text)) {
-            *animation = (int32_t)i;
+    for (uint32_t i = 0; i < count; i++)
+        if (!strcmp(first + i * bytes, text)) {
+            *found = (int32_t)i;
             return true;
         }
     unsigned long number = strtoul(text, &end, 10);
-    if (*text >= '0' && *text <= '9' && !*end && number < m->animation_count) {
-        *animation = (int32_t)number;
+    if (*text >= '0' && *text <= '9' && !*end && number < count) {
+        *found = (int32_t)number;
         return true;
     }
-    if (!m->animation_count)
-        return pen_fail(error, PEN_INVALID, "/animation", "The scene has no animations.");
-    for (size_t i = 0, at = 0; i < m->animation_count && at < sizeof list; i++) {
-        const char *name = m->animations[i].name;
+    snprintf(pointer, sizeof pointer, "/%s", what);
+    if (!count)
+        return pen_fail(error, PEN_INVALID, pointer, "The scene has no %ss.", what);
+    for (size_t i = 0, at = 0; i < count && at < sizeof list; i++) {
+        const char *name = first + i * bytes;
         at += (size_t)(*name ? snprintf(list + at, sizeof list - at, i ? ", %s" : "%s", name)
                              : snprintf(list + at, sizeof list - at, i ? ", %zu" : "%zu", i));
     }
-    return pen_fail(error, PEN_INVALID, "/animation",
-        "The scene has the animations %s; there is no \"%.60s\".", list, text);
+    return pen_fail(error, PEN_INVALID, pointer, "The scene has the %ss %s; there is no \"%.60s\".",
+        what, list, text);
+}
+
+bool pose_find(
+    const struct psc_scene *scene, const char *text, int32_t *animation, struct pen_error *error)
+{
+    return find_named(scene->motion.animations, scene->motion.animation_count,
+        sizeof *scene->motion.animations, text, "animation", animation, error);
+}
+
+bool pose_find_variant(
+    const struct psc_scene *scene, const char *text, int32_t *variant, struct pen_error *error)
+{
+    return find_named(scene->motion.variants, scene->motion.variant_count,
+        sizeof *scene->motion.variants, text, "variant", variant, error);
 }
 
 float pose_clamp(const struct psc_scene *scene, int32_t animation, float time_s)
@@ -347,6 +366,22 @@ bool pose_set(
         return pen_fail(error, PEN_INVALID, "/time_s",
             "At this moment the animation moves something beyond 1e12 m.");
     return true;
+}
+
+uint32_t pose_dress(struct pose *pose, int32_t variant)
+{
+    const struct psc_motion *m = &pose->rest->motion;
+    if (variant == pose->variant)
+        return 0;
+    pose->variant = variant;
+    for (uint32_t i = 0; i < pose->rest->primitive_count; i++)
+        pose->primitives[i].material = pose->rest->primitives[i].material;
+    uint32_t count = variant >= 0 ? m->variants[variant].swap_count : 0;
+    for (uint32_t i = count; i-- > 0;) {
+        const struct psc_swap *swap = &m->swaps[m->variants[variant].first_swap + i];
+        pose->primitives[swap->primitive].material = swap->material;
+    }
+    return POSE_SURFACES;
 }
 
 const struct psc_scene *pose_scene(const struct pose *pose)

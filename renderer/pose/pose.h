@@ -12,6 +12,7 @@ enum pose_change {
     POSE_MATERIALS = 8, /* their factors and texture transforms */
     POSE_ALPHA = 16,    /* of materials, what says where their surfaces are */
     POSE_LIGHTS = 32,   /* or cameras */
+    POSE_SURFACES = 64, /* which material a primitive has */
 };
 
 /* Over a scene that outlives it, with memory of its own for all that moves; at rest. */
@@ -23,6 +24,10 @@ void pose_destroy(struct pose *pose);
 bool pose_find(
     const struct psc_scene *scene, const char *text, int32_t *animation, struct pen_error *error);
 
+/* The same of a variant, at /variant; -1 for "": as the file is. */
+bool pose_find_variant(
+    const struct psc_scene *scene, const char *text, int32_t *variant, struct pen_error *error);
+
 /* The time that an animation is held at: before its first key as at it, after its last as there. */
 float pose_clamp(const struct psc_scene *scene, int32_t animation, float time_s);
 
@@ -30,6 +35,10 @@ float pose_clamp(const struct psc_scene *scene, int32_t animation, float time_s)
  * PEN_INVALID when something moves out of range; the pose then has to be set again. */
 bool pose_set(
     struct pose *pose, int32_t animation, float time_s, uint32_t *changes, struct pen_error *error);
+
+/* Gives primitives the materials of a variant, whatever the pose; -1: their own. Returns
+ * POSE_SURFACES when something changed. */
+uint32_t pose_dress(struct pose *pose, int32_t variant);
 
 /* The scene as posed, without what is hidden: owned by the pose, in place until it is destroyed. */
 const struct psc_scene *pose_scene(const struct pose *pose);

@@ -12,12 +12,18 @@ struct instance_record {
     uint32_t pad[3];
 };
 
+/* No request changes what it is made of. */
+static bool is_still(const struct scene *s)
+{
+    return !s->file.motion.animation_count && !s->file.motion.variant_count;
+}
+
 static GLuint make_buffer(struct scene *s, const void *data, size_t bytes)
 {
     GLuint name;
     gl.CreateBuffers(1, &name);
     gl.NamedBufferStorage(name, bytes ? (GLsizeiptr)bytes : 16, bytes ? data : NULL,
-        s->file.motion.animation_count ? GL_DYNAMIC_STORAGE_BIT : 0);
+        is_still(s) ? 0 : GL_DYNAMIC_STORAGE_BIT);
     s->bytes += bytes;
     return name;
 }
@@ -267,7 +273,7 @@ static struct scene *open_file(struct scene *s, struct pen_error *error)
 {
     uint32_t changes;
     s->blob = s->file;
-    s->pose = (struct scene_pose){-1, 0};
+    s->pose = (struct scene_pose){-1, 0, -1};
     s->moving_animation = -1;
     for (uint32_t i = 0; i < s->file.instance_count && !s->poses; i++)
         if (s->file.instances[i].flags & PSC_HIDDEN)
@@ -380,37 +386,40 @@ static void follow_pose(struct scene *s, uint32_t changes)
     s->blob = *pose_scene(s->poses);
     if (changes & POSE_VERTICES)
         upload_moved(s);
-    if (changes & (POSE_INSTANCES | POSE_STATE))
+    if (changes & (POSE_INSTANCES | POSE_STATE | POSE_SURFACES))
         upload_instances(s);
-    if (changes & POSE_STATE)
+    if (changes & (POSE_STATE | POSE_SURFACES))
         make_groups(s);
     if (changes & POSE_MATERIALS)
         upload_materials(s);
     scene_measure(s);
     s->moved += (changes & (POSE_VERTICES | POSE_INSTANCES)) != 0;
-    s->remade += (changes & (POSE_STATE | POSE_ALPHA)) != 0;
+    s->remade += (changes & (POSE_STATE | POSE_ALPHA | POSE_SURFACES)) != 0;
 }
 
-bool scene_set_pose(struct scene *s, const char *animation, float time_s, struct pen_error *error)
+bool scene_set_pose(struct scene *s, const struct pen_request *request, struct pen_error *error)
 {
     struct scene_pose pose;
     uint32_t changes;
-    if (!pose_find(&s->file, animation, &pose.animation, error))
+    if (!pose_find(&s->file, request->animation, &pose.animation, error) ||
+        !pose_find_variant(&s->file, request->variant, &pose.variant, error))
         return false;
-    pose.time_s = pose_clamp(&s->file, pose.animation, time_s);
-    if (pose.animation == s->pose.animation && pose.time_s == s->pose.time_s)
+    pose.time_s = pose_clamp(&s->file, pose.animation, request->time_s);
+    if (!memcmp(&pose, &s->pose, sizeof pose))
         return true;
     if (!s->poses)
         s->poses = pose_create(&s->file);
     s->pose = pose;
     bool fits = pose_set(s->poses, pose.animation, pose.time_s, &changes, error);
     if (!fits) { /* back to where nothing is out of range */
-        s->pose = (struct scene_pose){-1, 0};
+        s->pose = (struct scene_pose){-1, 0, -1};
         pose_destroy(s->poses);
         s->poses = pose_create(&s->file);
         pose_set(s->poses, -1, 0, &changes, NULL);
-        changes = POSE_VERTICES | POSE_INSTANCES | POSE_STATE | POSE_MATERIALS | POSE_ALPHA;
+        changes = POSE_VERTICES | POSE_INSTANCES | POSE_STATE | POSE_MATERIALS | POSE_ALPHA |
+                  POSE_SURFACES;
     }
+    changes |= pose_dress(s->poses, s->pose.variant);
     follow_pose(s, changes);
     return fits;
 }

@@ -34,6 +34,7 @@ struct scene_attachment {
 struct scene_pose {
     int32_t animation; /* -1: the rest pose, at time 0 */
     float time_s;      /* within the animation */
+    int32_t variant;   /* -1: as the file is */
 };
 
 struct scene {
@@ -76,11 +77,12 @@ struct scene_attachment *scene_attachment(
     const struct scene *scene, void (*destroy)(struct scene_attachment *attachment));
 void scene_detach(struct scene *scene, struct scene_attachment *attachment); /* and destroys it */
 
-/* Poses it by one of its animations ("": at rest; see pose_find), held within the animation's time.
+/* Poses it by the request's animation ("": at rest; see pose_find), held within the animation's time,
+ * and dresses it in the request's variant.
  * Buffers, bounds and all that was derived from the pose before follow. Errors: PEN_INVALID; the
  * scene is then at rest. */
 bool scene_set_pose(
-    struct scene *scene, const char *animation, float time_s, struct pen_error *error);
+    struct scene *scene, const struct pen_request *request, struct pen_error *error);
 /* measure.c: of the scene as posed, once it is; everything below follows from it. */
 void scene_measure(struct scene *scene);
 /* What a ground lies under, m: the stage's lowest point, or that of the rest pose. */

@@ -42,6 +42,7 @@ static char *describe_scene(
         .camera_count = scene->camera_count,
         .light_count = scene->light_count,
         .animation_count = scene->motion.animation_count,
+        .variant_count = scene->motion.variant_count,
         .warnings = scene->warnings,
         .warning_bytes = scene->warning_bytes,
     };
@@ -74,11 +75,16 @@ static char *describe_scene(
         animations[i].duration_s = from->duration_s;
         snprintf(animations[i].name, sizeof animations[i].name, "%s", from->name);
     }
+    struct pen_scene_variant *variants = pen_alloc_zero(info.variant_count, sizeof *variants);
+    for (uint32_t i = 0; i < info.variant_count; i++)
+        snprintf(variants[i].name, sizeof variants[i].name, "%s", scene->motion.variants[i].name);
     info.animations = animations;
+    info.variants = variants;
     info.cameras = cameras;
     info.lights = lights;
     char *text = pen_scene_json(&info);
     free(animations);
+    free(variants);
     free(cameras);
     free(lights);
     return text;

@@ -138,14 +138,80 @@ static void point_solids(void)
     imported_free(&r);
 }
 
-/* A cloud that would need more triangles than a scene may have is refused before it is built. */
-static void too_many_points(void)
+/* Zeros, so many that not all are drawn: by the budget 4 vertices for each point, or 8 for each line. */
+static struct imported crowd(int mode, uint32_t count)
 {
-    struct imported r = import_json(
-        HEAD "\"meshes\":[{\"primitives\":[{\"mode\":0,\"attributes\":{\"POSITION\":0}}]}],"
-             "\"accessors\":[{\"componentType\":5126,\"count\":3000000,\"type\":\"VEC3\"}]}");
-    CHECK(r.error.code == PEN_TOO_BIG && strstr(r.error.message, "points or lines"));
+    struct {
+        uint32_t at[2];
+        float to[6];
+    } ends = {{0, count - 1}, {0, 0, 0, 3, 4, 0}};
+    char *json = text(HEAD
+        "\"meshes\":[{\"primitives\":[{\"mode\":%d,\"attributes\":{\"POSITION\":0}}]}],"
+        "\"accessors\":[{\"componentType\":5126,\"count\":%u,\"type\":\"VEC3\",\"sparse\":{"
+        "\"count\":2,\"indices\":{\"bufferView\":0,\"componentType\":5125},"
+        "\"values\":{\"bufferView\":1}}}],"
+        "\"bufferViews\":[{\"buffer\":0,\"byteLength\":8},"
+        "{\"buffer\":0,\"byteOffset\":8,\"byteLength\":24}],"
+        "\"buffers\":[{\"byteLength\":32,\"uri\":\"data:;base64,%s\"}]}",
+        mode, count, base64(&ends, sizeof ends));
+    struct imported r = import_json(json);
+    free(json);
+    return r;
+}
+
+static void too_many(void)
+{
+    struct imported r = crowd(0, 1200000); /* 7.2 million vertices of octahedra: too many */
+    CHECK(r.ok && has_warning(&r.scene, "thin solids") && !has_warning(&r.scene, "too many"));
+    CHECK(r.ok && r.scene.header->triangles == 4 * 1200000);
+    double volume = 0, radius = 0.001 * 5; /* so many on so little: the least */
+    for (uint32_t i = 0; r.ok && i < r.scene.index_count; i += 3) {
+        float n[3];
+        front(&r.scene, i, n);
+        for (int k = 0; k < 3; k++)
+            volume += n[k] * r.scene.positions[r.scene.indices[i]][k] / 6;
+    }
+    CHECK_NEAR(volume, 1200000 * 8 / (9 * sqrt(3)) * pow(radius, 3), 1e-3 * volume);
     imported_free(&r);
+    r = crowd(0, 4000000); /* 16 million of tetrahedra: every third point */
+    CHECK(r.ok && has_warning(&r.scene, "Of 4000000 points and ends of lines one in 3 is drawn"));
+    CHECK(r.ok && r.scene.header->triangles == 4 * 1333334u);
+    imported_free(&r);
+    r = crowd(3, 1000001); /* a strip of lines of no length, but for the last */
+    CHECK(r.ok && has_warning(&r.scene, "one in 2 is drawn"));
+    CHECK(r.ok && r.scene.header->triangles == 8);
+    CHECK(r.ok && r.scene.header->extent_max[1] == 4);
+    imported_free(&r);
+    r = crowd(0, 96000001); /* of which not even the count is believed */
+    CHECK(r.error.code == PEN_TOO_BIG);
+    imported_free(&r);
+}
+
+/* Attributes that do not suit their primitive are left out; the shape does not need them. */
+static void unsuitable(void)
+{
+    const struct {
+        const char *name, *type;
+        int count;
+    } cases[] = {{"NORMAL", "VEC4", 3}, {"NORMAL", "VEC3", 2}, {"TEXCOORD_0", "VEC3", 3},
+        {"TEXCOORD_1", "VEC2", 0}, {"COLOR_0", "SCALAR", 3}, {"COLOR_0", "VEC4", 1}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        char *json =
+            text(HEAD "\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0,\"%s\":1}}]}],"
+                      "\"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":3,"
+                      "\"type\":\"VEC3\"},{\"componentType\":5126,\"count\":%d,\"type\":\"%s\"}],"
+                      "\"bufferViews\":[{\"buffer\":0,\"byteLength\":36}],"
+                      "\"buffers\":[{\"byteLength\":36,\"uri\":\"data:;base64,%s\"}]}",
+                cases[i].name, cases[i].count, cases[i].type,
+                base64((const float[9]){[3] = 1, [7] = 1}, 36));
+        struct imported r = import_json(json);
+        free(json);
+        CHECK(r.ok && has_warning(&r.scene, "An attribute is left out. glTF /accessors/1"));
+        CHECK(r.ok && draws(&r.scene, V(0, 0, 0), V(1, 0, 0), V(0, 1, 0)));
+        CHECK(r.ok && r.scene.attributes[0].normal[2] == 32767); /* of the triangle */
+        CHECK(r.ok && r.scene.attributes[0].color[0] == 255);
+        imported_free(&r);
+    }
 }
 
 /* One vertex of a triangle with every attribute; colours as vec3 of bytes, uv
@@ -314,7 +380,8 @@ int main(void)
     modes();
     marks();
     point_solids();
-    too_many_points();
+    too_many();
+    unsuitable();
     attributes();
     sharing_and_welding();
     meshlets();

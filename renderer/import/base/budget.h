@@ -17,11 +17,14 @@
 #define IMP_MAX_PRIMITIVES 262144u
 #define IMP_MAX_ITEMS 524288u /* of each other array of the document */
 #define IMP_MAX_MATERIALS 65536u
+#define IMP_MAX_VARIANTS 4096u
 #define IMP_MAX_LIGHTS 1024u /* uses of a light; of a camera likewise */
 /* After strips and fans are unrolled, all primitives together. */
 #define IMP_MAX_INDICES 96000000ull
 #define IMP_MAX_VERTICES 16000000ull /* used by some index, all primitives together */
 #define IMP_MAX_ACCESSOR 96000000u   /* elements of one POSITION accessor, used or not */
+/* Of the solids that points and lines become; beyond it those are simpler, then fewer. */
+#define IMP_MAX_MARK_VERTICES 6000000ull
 /* See optimise.c; a plain mesh takes 36 per corner. */
 #define IMP_MAX_OPTIMISER_WORK 8000000000ull
 #define IMP_MAX_MESHOPT_BYTES (512ull << 20) /* unpacked, all views together */

@@ -1,7 +1,7 @@
 #include "renderer/import/convert/camera.h"
 #include "renderer/blob/affine.h"
 #include "renderer/import/base/budget.h"
-#include "renderer/import/convert/name.h"
+#include "renderer/import/base/name.h"
 #include "renderer/pose/place.h"
 #include <string.h>
 

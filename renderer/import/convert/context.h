@@ -50,6 +50,18 @@ struct imp_context {
 
     struct imp_motion *motion; /* motion.h */
 
+    struct imp_marks {   /* marks.h */
+        uint32_t stride; /* every so many of the points and lines is drawn */
+        bool plain;
+    } marks;
+
+    struct imp_swap { /* variants.h */
+        uint32_t variant, order;
+        struct psc_swap swap;
+    } * swaps;
+    uint32_t swap_count;
+    size_t swap_room;
+
     uint64_t *warned; /* hashes of the warnings given */
     uint32_t warned_count;
 };

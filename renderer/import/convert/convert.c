@@ -1,10 +1,12 @@
 #include "renderer/import/convert/convert.h"
 #include "protocol/memory.h"
 #include "renderer/import/base/budget.h"
+#include "renderer/import/convert/marks.h"
 #include "renderer/import/convert/material.h"
 #include "renderer/import/convert/mesh.h"
 #include "renderer/import/convert/node.h"
 #include "renderer/import/convert/texture.h"
+#include "renderer/import/convert/variants.h"
 #include "renderer/import/motion/motion.h"
 #include <math.h>
 #include <stdlib.h>
@@ -42,11 +44,13 @@ bool imp_convert(struct imp_document *document, struct gltf_model *model,
     if (model->scene_count > 1)
         imp_warn(&context, "The glTF has %u scenes; scene %u is used.", model->scene_count,
             model->scene);
+    imp_marks_plan(&context);
     if (!imp_primitives_fit(model, error) || !imp_add_nodes(&context, error))
         goto fail;
     imp_material(&context, -1); /* a blob has at least one material */
     if (!context.instance_count)
         imp_warn(&context, "The scene draws nothing.");
+    imp_variants_close(&context);
     done = imp_add_images(&context, error);
 fail:
     free(context.primitives);
@@ -55,6 +59,7 @@ fail:
     free(context.image_slots);
     free(context.primitive_bounds);
     imp_motion_free(context.motion);
+    free(context.swaps);
     free(context.stamps);
     free(context.stamped);
     free(context.warned);

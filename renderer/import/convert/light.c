@@ -1,7 +1,7 @@
 /* KHR_lights_punctual and EXT_lights_area. */
 #include "renderer/import/convert/light.h"
 #include "renderer/import/base/budget.h"
-#include "renderer/import/convert/name.h"
+#include "renderer/import/base/name.h"
 #include "renderer/import/base/text.h"
 #include "renderer/pose/place.h"
 #include <string.h>

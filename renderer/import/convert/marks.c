@@ -1,6 +1,7 @@
 /* Points and lines as solids, which are lit and cast like everything else: an octahedron at each
  * point and at each end of a line, and a square bar along each line, with the normals of spheres
- * and cylinders. How thick they are follows from the primitive itself. */
+ * and cylinders. How thick they are follows from the primitive itself. Where there are very many,
+ * points are tetrahedra and lines have no ends. */
 #include "renderer/import/convert/marks.h"
 #include "protocol/memory.h"
 #include "renderer/import/base/budget.h"
@@ -8,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { POINTS, LINES, LINE_LOOP };
+enum { POINTS, LINES, LINE_LOOP, MOST_MODE = 3 };
 
 #define POINT_OF_SPACING 0.25f /* a point's radius, of the distance if they filled a square ... */
 #define POINT_LEAST 0.001f     /* ... but of the primitive's diagonal at least and at most this */
@@ -55,6 +56,22 @@ static void add_octahedron(struct solid *s, uint32_t from, const float center[3]
         bool odd = __builtin_popcount(octant) % 2;
         add_triangle(s, x, odd ? z : y, odd ? y : z);
     }
+}
+
+/* The same with half the triangles. */
+static void add_tetrahedron(struct solid *s, uint32_t from, const float center[3], float radius)
+{
+    static const float third = 0.57735027f; /* 1 / sqrt 3 */
+    uint32_t v = s->g.vertex_count;
+    for (uint32_t i = 0; i < 4; i++) { /* every other corner of a cube */
+        const float normal[3] = {
+            i & 1 ? third : -third, i & 2 ? third : -third, __builtin_parity(i) ? third : -third};
+        add_vertex(s, from, center, normal, radius);
+    }
+    add_triangle(s, v, v + 1, v + 2);
+    add_triangle(s, v, v + 3, v + 1);
+    add_triangle(s, v, v + 2, v + 3);
+    add_triangle(s, v + 1, v + 3, v + 2);
 }
 
 static void add_bar(
@@ -141,19 +158,63 @@ static void take_attributes(struct solid *s, const struct imp_geometry *given)
         s->g.used[v] = given->used[s->from[v]];
 }
 
+#define BALL_VERTICES 6
+#define PLAIN_BALL_VERTICES 4
+#define BAR_VERTICES 8
+
+static uint32_t bars_of(uint32_t mode, uint32_t corners)
+{
+    return mode == POINTS  ? 0
+           : mode == LINES ? corners / 2
+                           : corners - (mode != LINE_LOOP && corners);
+}
+
+/* Lines have no balls at their ends when they are plain. */
+static uint64_t vertices_of(uint32_t mode, bool plain, uint64_t balls, uint64_t bars)
+{
+    uint64_t of_ball = !plain ? BALL_VERTICES : mode == POINTS ? PLAIN_BALL_VERTICES : 0;
+    return of_ball * balls + BAR_VERTICES * bars;
+}
+
+void imp_marks_plan(struct imp_context *context)
+{
+    const struct gltf_model *model = context->model;
+    uint64_t need[2] = {0, 0}, corners = 0;
+    for (uint32_t i = 0; i < model->primitive_count; i++) {
+        const struct gltf_primitive *p = &model->primitives[i];
+        int32_t counted = p->indices >= 0 ? p->indices : p->position;
+        if (p->mode > MOST_MODE || (uint32_t)counted >= model->accessor_count)
+            continue;
+        uint64_t count = model->accessors[counted].count;
+        corners += count;
+        for (int plain = 0; plain < 2; plain++)
+            need[plain] += vertices_of(p->mode, plain, count,
+                p->mode == LINES ? count / 2
+                : p->mode        ? count
+                                 : 0);
+    }
+    context->marks.plain = need[0] > IMP_MAX_MARK_VERTICES;
+    uint64_t stride = (need[1] + IMP_MAX_MARK_VERTICES - 1) / IMP_MAX_MARK_VERTICES;
+    context->marks.stride = stride < 1 ? 1 : stride > UINT32_MAX ? UINT32_MAX : (uint32_t)stride;
+    if (context->marks.stride > 1)
+        imp_warn(context,
+            "Of %llu points and ends of lines one in %u is drawn: there are too many.",
+            (unsigned long long)corners, context->marks.stride);
+}
+
 bool imp_marks_thicken(
     struct imp_context *context, struct imp_geometry *g, uint32_t mode, struct pen_error *error)
 {
-    uint32_t corners = g->index_count;
-    uint32_t bars = mode == POINTS  ? 0
-                    : mode == LINES ? corners / 2
-                                    : corners - (mode != LINE_LOOP && corners);
-    uint64_t vertices = 6 * (uint64_t)g->vertex_count + 8 * (uint64_t)bars;
-    uint64_t indices = 24 * ((uint64_t)g->vertex_count + bars);
+    bool plain = context->marks.plain;
+    uint32_t corners = g->index_count, bars = bars_of(mode, corners);
+    uint32_t balls = plain && mode != POINTS ? 0 : g->vertex_count;
+    uint64_t vertices = vertices_of(mode, plain, balls, bars);
+    uint64_t indices = (plain ? 12 : 24) * (uint64_t)balls + 24 * (uint64_t)bars;
     if (vertices > IMP_MAX_VERTICES - context->vertex_count ||
         indices > IMP_MAX_INDICES - context->index_count)
         return pen_fail(error, PEN_TOO_BIG, "",
-            "The scene has more points or lines than can be drawn: each takes 8 triangles of %llu.",
+            "The scene has more points or lines than can be drawn: they take up to 8 triangles of "
+            "%llu.",
             IMP_MAX_INDICES / 3);
     context->vertex_count += vertices;
     context->index_count += indices;
@@ -163,8 +224,8 @@ bool imp_marks_thicken(
                           .indices = pen_alloc_zero((size_t)indices, sizeof *s.g.indices)},
         .from = pen_alloc_zero((size_t)vertices, sizeof *s.from)};
     float radius = radius_of(g, mode);
-    for (uint32_t v = 0; v < g->vertex_count; v++)
-        add_octahedron(&s, v, g->positions[v], radius);
+    for (uint32_t v = 0; v < balls; v++)
+        (plain ? add_tetrahedron : add_octahedron)(&s, v, g->positions[v], radius);
     for (uint32_t i = 0; i < bars; i++) {
         uint32_t first = mode == LINES ? 2 * i : i;
         uint32_t a = g->indices[first], b = g->indices[(first + 1) % corners];

@@ -4,6 +4,7 @@
 #include "renderer/import/base/budget.h"
 #include "renderer/import/convert/marks.h"
 #include "renderer/import/convert/material.h"
+#include "renderer/import/convert/variants.h"
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -25,18 +26,25 @@ static uint32_t corner(const struct corners *corners, uint32_t i)
     return corners->indexed ? imp_read_index(&corners->indices, i) : i;
 }
 
-/* Points and lines keep their corners as they are; unrolls strips and fans: section 3.7.2.1 of the
- * glTF 2.0 specification. */
+/* Points and lines keep their corners, or every `stride`-th of them. */
+static void pick_marks(
+    struct imp_geometry *g, const struct corners *corners, uint32_t mode, uint32_t stride)
+{
+    uint32_t run = mode == LINES ? 2 : 1; /* a pair is a line */
+    uint32_t n = corners->count - corners->count % run;
+    g->indices = pen_alloc_zero(n / stride + 2 * run, sizeof *g->indices);
+    for (uint64_t i = 0; i < n; i += (uint64_t)stride * run)
+        for (uint32_t k = 0; k < run; k++)
+            if (i + k < n)
+                g->indices[g->index_count++] = corner(corners, (uint32_t)i + k);
+    if (mode > LINES && n && (n - 1) % stride) /* a strip ends where it did */
+        g->indices[g->index_count++] = corner(corners, n - 1);
+}
+
+/* Unrolls strips and fans: section 3.7.2.1 of the glTF 2.0 specification. */
 static void unroll(struct imp_geometry *g, const struct corners *corners, uint32_t mode)
 {
     uint32_t n = corners->count, out = 0;
-    if (mode < TRIANGLES) {
-        g->indices = pen_alloc_zero(n, sizeof *g->indices);
-        n -= mode == LINES ? n % 2 : 0; /* a pair is a line */
-        for (g->index_count = 0; g->index_count < n; g->index_count++)
-            g->indices[g->index_count] = corner(corners, g->index_count);
-        return;
-    }
     uint32_t triangles = mode == TRIANGLES ? n / 3 : n >= 3 ? n - 2 : 0;
     g->indices = pen_alloc_zero(3 * (size_t)triangles, sizeof *g->indices);
     for (uint32_t i = 0; i < triangles; i++) {
@@ -90,7 +98,10 @@ static bool read_triangles(struct imp_context *context, struct imp_geometry *g,
     uint64_t most = primitive->mode <= TRIANGLES ? corners.count : 3 * (uint64_t)corners.count;
     if (most > IMP_MAX_INDICES - context->index_count)
         return too_many_triangles(error);
-    unroll(g, &corners, primitive->mode);
+    if (primitive->mode < TRIANGLES)
+        pick_marks(g, &corners, primitive->mode, context->marks.stride);
+    else
+        unroll(g, &corners, primitive->mode);
     if (primitive->mode >= TRIANGLES)
         context->index_count += g->index_count;
     for (uint32_t i = 0; i < g->index_count; i++)
@@ -128,6 +139,16 @@ static void compact(struct imp_context *context, struct imp_geometry *g, uint32_
     }
 }
 
+/* NULL: it suits. */
+static const char *why_not(const struct imp_geometry *g, const struct imp_reader *reader,
+    uint32_t least, uint32_t components)
+{
+    if (reader->components < least || reader->components > components)
+        return "its type does not suit the attribute";
+    return reader->count < g->used_of ? "it has fewer elements than the primitive has vertices"
+                                      : NULL;
+}
+
 bool imp_gather(struct imp_context *context, const struct imp_geometry *g, int32_t accessor,
     uint32_t least, uint32_t components, void *out, struct pen_error *error)
 {
@@ -138,12 +159,9 @@ bool imp_gather(struct imp_context *context, const struct imp_geometry *g, int32
         return true;
     if (!imp_reader_init(&reader, context->document, context->model, accessor, error))
         return false;
-    if (reader.components < least || reader.components > components)
-        return pen_fail(
-            error, PEN_INVALID, pointer, "glTF %s: its type does not suit the attribute.", pointer);
-    if (reader.count < g->used_of)
-        return pen_fail(error, PEN_INVALID, pointer,
-            "glTF %s: it has fewer elements than the primitive has vertices.", pointer);
+    const char *why = why_not(g, &reader, least, components);
+    if (why)
+        return pen_fail(error, PEN_INVALID, pointer, "glTF %s: %s.", pointer, why);
     float *values = pen_alloc_zero((size_t)g->vertex_count * components, sizeof *values);
     *(float **)out = values;
     for (uint32_t i = 0; i < g->vertex_count; i++) {
@@ -152,6 +170,22 @@ bool imp_gather(struct imp_context *context, const struct imp_geometry *g, int32
             value[k] = 1;
         imp_read_floats(&reader, g->used[i], value, components);
     }
+    return true;
+}
+
+/* Of an attribute that the primitive can do without: left out when it does not suit. */
+static bool gather_extra(struct imp_context *context, const struct imp_geometry *g,
+    int32_t accessor, uint32_t least, uint32_t components, void *out, struct pen_error *error)
+{
+    struct imp_reader reader;
+    if (accessor < 0)
+        return true;
+    if (!imp_reader_init(&reader, context->document, context->model, accessor, error))
+        return false;
+    const char *why = why_not(g, &reader, least, components);
+    if (!why)
+        return imp_gather(context, g, accessor, least, components, out, error);
+    imp_warn(context, "An attribute is left out. glTF /accessors/%d: %s.", accessor, why);
     return true;
 }
 
@@ -164,13 +198,13 @@ static bool read_vertices(struct imp_context *context, struct imp_geometry *g,
         return too_many_vertices(error);
     context->vertex_count += g->vertex_count;
     if (!imp_gather(context, g, primitive->position, 3, 3, &g->positions, error) ||
-        !imp_gather(context, g, primitive->normal, 3, 3, &g->normals, error) ||
-        !imp_gather(context, g, primitive->uv[0], 2, 2, &g->uv[0], error) ||
-        !imp_gather(context, g, primitive->uv[1], 2, 2, &g->uv[1], error) ||
-        !imp_gather(context, g, primitive->color, 3, 4, &g->colors, error))
+        !gather_extra(context, g, primitive->normal, 3, 3, &g->normals, error) ||
+        !gather_extra(context, g, primitive->uv[0], 2, 2, &g->uv[0], error) ||
+        !gather_extra(context, g, primitive->uv[1], 2, 2, &g->uv[1], error) ||
+        !gather_extra(context, g, primitive->color, 3, 4, &g->colors, error))
         return false;
     /* Without normals the specification wants flat ones, and given tangents ignored. */
-    if (g->normals && !imp_gather(context, g, primitive->tangent, 4, 4, &g->tangents, error))
+    if (g->normals && !gather_extra(context, g, primitive->tangent, 4, 4, &g->tangents, error))
         return false;
     for (uint32_t i = 0; i < g->vertex_count; i++)
         for (int k = 0; k < 3; k++)
@@ -221,7 +255,7 @@ struct psc_mesh imp_geometry_mesh(
         .indices = g->indices,
         .index_count = g->index_count,
         .material = imp_material(context, material),
-        .need_tangents = imp_material_has_normal_map(context, material),
+        .need_tangents = imp_variants_need_tangents(context, number),
         .meshlet_triangles = g->meshlet_triangles,
         .meshlet_count = g->meshlet_count,
         .points = (const float(*)[3])g->points,
@@ -243,7 +277,10 @@ static bool add(struct imp_context *context, uint32_t number, struct imp_geometr
     g->used = NULL;
     imp_geometry_optimise(g, &context->optimiser_work);
     const struct psc_mesh mesh = imp_geometry_mesh(context, number, g);
-    return psc_builder_add_mesh(context->builder, &mesh, psc, error);
+    if (!psc_builder_add_mesh(context->builder, &mesh, psc, error))
+        return false;
+    imp_variants_note(context, number, *psc);
+    return true;
 }
 
 bool imp_primitive(

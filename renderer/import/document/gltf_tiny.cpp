@@ -15,6 +15,8 @@ struct Owner {
     std::vector<gltf_accessor> accessors;
     std::vector<gltf_primitive> primitives;
     std::vector<gltf_mesh> meshes;
+    std::vector<gltf_mapping> mappings;
+    std::vector<const char *> variants;
     std::vector<gltf_node> nodes;
     std::vector<int32_t> children, roots;
     std::vector<gltf_target> targets;
@@ -157,12 +159,34 @@ int32_t attribute(const std::map<std::string, int> &attributes, const char *name
     return it == attributes.end() ? -1 : it->second;
 }
 
+const tinygltf::Value *list(const tinygltf::Value *object, const char *key)
+{
+    return object && object->Has(key) && object->Get(key).IsArray() ? &object->Get(key) : nullptr;
+}
+
+void add_mappings(const tinygltf::Primitive &from, Owner &owner)
+{
+    const tinygltf::Value *mappings =
+        list(find(from.extensions, "KHR_materials_variants"), "mappings");
+    for (size_t i = 0; mappings && i < mappings->ArrayLen(); i++) {
+        const tinygltf::Value &mapping = mappings->Get(static_cast<int>(i));
+        const tinygltf::Value *variants = list(&mapping, "variants");
+        for (size_t k = 0; variants && k < variants->ArrayLen(); k++)
+            owner.mappings.push_back(
+                {static_cast<uint32_t>(variants->Get(static_cast<int>(k)).GetNumberAsDouble()),
+                    integer(mapping, "material", -1)});
+    }
+}
+
 gltf_primitive convert(const tinygltf::Primitive &from, Owner &owner)
 {
     gltf_primitive to = {};
     to.mode = static_cast<uint32_t>(from.mode);
     to.indices = from.indices;
     to.material = from.material;
+    to.first_mapping = static_cast<uint32_t>(owner.mappings.size());
+    add_mappings(from, owner);
+    to.mapping_count = static_cast<uint32_t>(owner.mappings.size()) - to.first_mapping;
     to.position = attribute(from.attributes, "POSITION");
     to.normal = attribute(from.attributes, "NORMAL");
     to.tangent = attribute(from.attributes, "TANGENT");
@@ -389,6 +413,10 @@ void convert(const tinygltf::Model &model, Owner &owner, gltf_model &view)
             for (size_t i = 0; i < area->Get("lights").ArrayLen(); i++)
                 owner.area_lights.push_back(
                     convert_area(area->Get("lights").Get(static_cast<int>(i)), owner));
+    const tinygltf::Value *variants =
+        list(find(model.extensions, "KHR_materials_variants"), "variants");
+    for (size_t i = 0; variants && i < variants->ArrayLen(); i++)
+        owner.variants.push_back(owner.keep(string(variants->Get(static_cast<int>(i)), "name")));
     choose_scene(model, owner, view);
 }
 
@@ -408,6 +436,8 @@ void show(const Owner &owner, gltf_model &view)
     SHOW(view, owner, cameras, camera_count);
     SHOW(view, owner, lights, light_count);
     SHOW(view, owner, area_lights, area_light_count);
+    SHOW(view, owner, mappings, mapping_count);
+    SHOW(view, owner, variants, variant_count);
     SHOW(view, owner, roots, root_count);
     view.children = owner.children.data();
     view.targets = owner.targets.data();

@@ -10,8 +10,6 @@ extern "C" {
 #endif
 #include "protocol/error.h"
 
-#define GLTF_NAME_BYTES 60
-
 struct gltf_accessor {
     int32_t view;        /* -1: zeros */
     uint32_t component;  /* GL's number: 5120 to 5126 */
@@ -26,6 +24,7 @@ struct gltf_accessor {
 struct gltf_primitive {
     uint32_t mode; /* 0 points to 6 triangle fan */
     int32_t indices, material;
+    uint32_t first_mapping, mapping_count;
     int32_t position, normal, tangent, uv[2], color; /* accessors; -1: none */
     int32_t joints[2], weights[2];
     uint32_t first_target, target_count;
@@ -33,6 +32,12 @@ struct gltf_primitive {
 
 struct gltf_target {
     int32_t position, normal, tangent; /* accessors; -1: none */
+};
+
+/* KHR_materials_variants: what the primitive is made of in a variant. */
+struct gltf_mapping {
+    uint32_t variant;
+    int32_t material;
 };
 
 struct gltf_mesh {
@@ -121,6 +126,9 @@ struct gltf_model {
     const struct gltf_light *lights, *area_lights;
     uint32_t accessor_count, primitive_count, mesh_count, node_count, material_count, texture_count,
         sampler_count, camera_count, light_count, area_light_count;
+    const struct gltf_mapping *mappings;
+    const char *const *variants; /* their names */
+    uint32_t mapping_count, variant_count;
     const int32_t *roots; /* nodes of the scene that is shown */
     uint32_t root_count, scene_count, scene;
     void *owner;

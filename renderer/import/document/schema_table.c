@@ -23,6 +23,7 @@ const struct schema_array schema_arrays[SCHEMA_ARRAYS] = {
     [IN_SKINS] = {"skins", IMP_MAX_MATERIALS},
     [IN_LIGHTS] = {"lights", IMP_MAX_MATERIALS, "KHR_lights_punctual"},
     [IN_AREA_LIGHTS] = {"lights", IMP_MAX_MATERIALS, "EXT_lights_area"},
+    [IN_VARIANTS] = {"variants", IMP_MAX_VARIANTS, "KHR_materials_variants"},
 };
 
 SCHEMA(asset, {"version", STRING, .required = true}, {"minVersion", STRING});
@@ -70,7 +71,13 @@ SCHEMA(accessor,
 SCHEMA(draco,
     {"bufferView", INDEX, .required = true, .into = IN_VIEWS},
     {"attributes", UINT_MAP, .required = true});
-SCHEMA(primitive_extensions, OBJ("KHR_draco_mesh_compression", draco));
+SCHEMA(variant_mapping,
+    {"material", INDEX, .required = true, .into = IN_MATERIALS},
+    {"variants", INDICES, .required = true, .into = IN_VARIANTS});
+SCHEMA(variant_mappings, ARRAY("mappings", variant_mapping));
+SCHEMA(primitive_extensions,
+    OBJ("KHR_draco_mesh_compression", draco),
+    OBJ("KHR_materials_variants", variant_mappings));
 SCHEMA(primitive,
     {"attributes", INDEX_MAP, .required = true, .into = IN_ACCESSORS},
     {"indices", INDEX, .into = IN_ACCESSORS},
@@ -202,7 +209,12 @@ SCHEMA(area_light,
     {"size", NUMBER},
     OBJ("rect", area_rect));
 SCHEMA(area_lights, ARRAY("lights", area_light));
-SCHEMA(root_extensions, OBJ("KHR_lights_punctual", lights), OBJ("EXT_lights_area", area_lights));
+SCHEMA(variant, {"name", STRING});
+SCHEMA(variants, ARRAY("variants", variant));
+SCHEMA(root_extensions,
+    OBJ("KHR_lights_punctual", lights),
+    OBJ("EXT_lights_area", area_lights),
+    OBJ("KHR_materials_variants", variants));
 
 SCHEMA(skin,
     {"inverseBindMatrices", INDEX, .into = IN_ACCESSORS},

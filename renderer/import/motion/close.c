@@ -2,7 +2,7 @@
 #include "protocol/memory.h"
 #include "renderer/import/convert/light.h"
 #include "renderer/import/convert/material.h"
-#include "renderer/import/convert/name.h"
+#include "renderer/import/base/name.h"
 #include "renderer/import/motion/aim.h"
 #include "renderer/import/motion/keys.h"
 #include <math.h>

@@ -5,6 +5,7 @@
 #include "renderer/import/base/budget.h"
 #include "renderer/import/geometry/accessor.h"
 #include "renderer/import/convert/mesh.h"
+#include "renderer/import/convert/variants.h"
 #include "renderer/import/motion/deform.h"
 #include <stdio.h>
 #include <stdlib.h>
@@ -352,6 +353,7 @@ static bool add(struct imp_context *context, struct deforming *d, uint32_t node,
         .target_count = d->target_count};
     if (!psc_builder_add_deforming(context->builder, &mesh, &how, &deform, error))
         return false;
+    imp_variants_note(context, number, deform.primitive);
     deform.skin = d->skin >= 0 ? (int32_t)skin : -1;
     deform.first_weight = slots->first;
     motion->deforms =

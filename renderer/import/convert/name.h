@@ -1,5 +1,0 @@
-#pragma once
-#include "renderer/import/document/gltf_tiny.h"
-
-/* The first name that is not empty, cut at a character's end, without control characters. */
-void imp_name(char to[GLTF_NAME_BYTES], const char *preferred, const char *otherwise);

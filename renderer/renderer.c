@@ -241,14 +241,19 @@ static const struct scene *find_image(void *owner, const struct pen_light *light
     return scene;
 }
 
+static bool is_posed_alike(const struct pen_request *a, const struct pen_request *b)
+{
+    return a->time_s == b->time_s && !strcmp(a->animation, b->animation) &&
+           !strcmp(a->variant, b->variant);
+}
+
 /* The scene cannot be in two poses at a time. */
 static bool can_pose(struct pen_renderer *r, struct scene *scene, const struct pen_request *request)
 {
     for (uint32_t i = 0; i < PEN_MAX_RENDERS; i++) {
         const struct lane *lane = &r->renders[i].lane;
         const struct pen_request *other = lane->busy ? &lane->result->completed : NULL;
-        if (other && lane->job.scene == scene &&
-            (strcmp(other->animation, request->animation) || other->time_s != request->time_s))
+        if (other && lane->job.scene == scene && !is_posed_alike(other, request))
             return false;
     }
     return true;

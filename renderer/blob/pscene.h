@@ -9,7 +9,7 @@
 #include <stdint.h>
 
 #define PSC_MAGIC "PSCENE\r\n"
-#define PSC_VERSION 6u
+#define PSC_VERSION 7u
 #define PSC_MESHLET_TRIANGLES 128u /* at most, per meshlet */
 
 enum psc_section_id {

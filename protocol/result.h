@@ -64,6 +64,7 @@ struct pen_result {
     uint64_t rays;        /* of methods that trace */
     uint64_t gpu_bytes;   /* resident scenes, images and shadow inputs */
     uint64_t image_bytes; /* encoded size */
+    double turns_ms;      /* that it had the renderer for itself, one turn after the other */
     struct pen_program_counts programs;
     struct pen_comparison comparison; /* all 0 unless a reference was given */
 };

@@ -198,6 +198,7 @@ bool scheduler_submit(struct scheduler *s, const struct pen_request *request,
             render->queued_ns = clock_now_ns();
             memcpy(render->key, key, PEN_ID_BYTES);
             render->measure = waiter->measure;
+            render->client = waiter->client;
             if (waiter->reference_fd > 0)
                 render->reference_fd = fcntl(waiter->reference_fd, F_DUPFD_CLOEXEC, 3);
             push_back(s, render);
@@ -246,12 +247,48 @@ static struct waiter *sift(struct waiter *list, uint32_t *gone_count)
     return kept;
 }
 
-struct render *scheduler_take(struct scheduler *s)
+static uint64_t pixels_of(const struct render *render)
+{
+    return (uint64_t)render->request.width * render->request.height;
+}
+
+/* The first of a queue that is not too large; NULL: none. */
+static struct render *first_fit(const struct scheduler *s, bool batch, uint64_t most_pixels)
+{
+    struct render *render = s->queue[batch][0];
+    while (render && pixels_of(render) > most_pixels)
+        render = render->next;
+    return render;
+}
+
+/* Of a render that runs, answers the waiters whose clients are gone. True when others are left. */
+static bool keep_wanted(struct scheduler *s, struct render *render)
+{
+    struct waiter *waiters = render->waiters;
+    render->waiters = NULL; /* while they are looked at, nobody else may answer them */
+    pthread_mutex_unlock(&s->lock);
+    uint32_t gone;
+    waiters = sift(waiters, &gone);
+    pthread_mutex_lock(&s->lock);
+    s->numbers.abandoned += gone;
+    s->numbers.waiting -= gone;
+    while (waiters) {
+        struct waiter *waiter = waiters;
+        waiters = waiter->next;
+        waiter->next = render->waiters;
+        render->waiters = waiter;
+    }
+    return render->waiters != NULL;
+}
+
+struct render *scheduler_take(struct scheduler *s, uint64_t most_pixels)
 {
     for (;;) {
         pthread_mutex_lock(&s->lock);
-        bool batch = s->queue[1][0] && (!s->queue[0][0] || s->turn % BATCH_TURN == BATCH_TURN - 1);
-        struct render *render = s->queue[batch][0];
+        struct render *interactive = first_fit(s, false, most_pixels);
+        struct render *batch = first_fit(s, true, most_pixels);
+        bool turn = s->turn % BATCH_TURN == BATCH_TURN - 1;
+        struct render *render = batch && (!interactive || turn) ? batch : interactive;
         if (!render) {
             pthread_mutex_unlock(&s->lock);
             return NULL;
@@ -263,23 +300,7 @@ struct render *scheduler_take(struct scheduler *s)
         render->next = s->running;
         s->running = render;
         s->numbers.running++;
-        struct waiter *waiters = render->waiters;
-        render->waiters = NULL; /* while they are looked at, nobody else may answer them */
-        pthread_mutex_unlock(&s->lock);
-
-        uint32_t gone;
-        waiters = sift(waiters, &gone);
-
-        pthread_mutex_lock(&s->lock);
-        s->numbers.abandoned += gone;
-        s->numbers.waiting -= gone;
-        while (waiters) {
-            struct waiter *waiter = waiters;
-            waiters = waiter->next;
-            waiter->next = render->waiters;
-            render->waiters = waiter;
-        }
-        bool wanted = render->waiters != NULL;
+        bool wanted = keep_wanted(s, render);
         if (!wanted)
             unlink_running(s, render);
         pthread_mutex_unlock(&s->lock);
@@ -287,6 +308,16 @@ struct render *scheduler_take(struct scheduler *s)
             return render;
         free_render(render);
     }
+}
+
+bool scheduler_is_wanted(struct scheduler *s, struct render *render)
+{
+    pthread_mutex_lock(&s->lock);
+    bool wanted = keep_wanted(s, render);
+    if (!wanted)
+        render->shareable = false;
+    pthread_mutex_unlock(&s->lock);
+    return wanted;
 }
 
 void scheduler_return(struct scheduler *s, struct render *render)

@@ -41,6 +41,7 @@ struct render {
     uint32_t measure;
     int reference_fd;         /* the render's own; 0: none */
     uint32_t attempts, kills; /* kept by the worker pool */
+    uint64_t client;          /* of the one who asked first */
 };
 
 struct scheduler_limits {
@@ -60,9 +61,12 @@ bool scheduler_submit(struct scheduler *scheduler, const struct pen_request *req
     struct pen_error *error);
 void scheduler_release(struct scheduler *scheduler, uint64_t client);
 
-/* The next render that somebody still waits for, interactive before batch; NULL: none. The caller
- * gives it back with scheduler_return (to be taken again, first) or scheduler_finish. */
-struct render *scheduler_take(struct scheduler *scheduler);
+/* The next render of at most so many pixels that somebody still waits for, interactive before batch;
+ * NULL: none. The caller gives it back with scheduler_return (to be taken again, first) or
+ * scheduler_finish. */
+struct render *scheduler_take(struct scheduler *scheduler, uint64_t most_pixels);
+/* Of one that was taken: somebody still waits for it. Once not, nobody can join it any more. */
+bool scheduler_is_wanted(struct scheduler *scheduler, struct render *render);
 void scheduler_return(struct scheduler *scheduler, struct render *render);
 /* Answers everybody who waits and frees the render. */
 void scheduler_finish(

@@ -5,7 +5,8 @@
 #include "server/queue/measure.h"
 #include <stddef.h>
 
-#define CHANNEL_VERSION 3u
+#define CHANNEL_VERSION 4u
+#define CHANNEL_MAX_JOBS 8  /* that a worker has at a time, being encoded or not */
 #define CHANNEL_WORKER_FD 3 /* the worker's end */
 #define CHANNEL_MAX_FDS (2 + PEN_MAX_LIGHTS)
 
@@ -17,11 +18,13 @@ enum channel_kind {
     CHANNEL_REFUSED,   /* worker: there is no such device; it then exits */
     CHANNEL_WARM,      /* worker: warmed up */
     CHANNEL_STARTED,   /* worker: the GL thread takes this job */
+    CHANNEL_TURN,      /* worker: it is alive, and from now on this job has its turns */
     CHANNEL_RENDERED,  /* worker: the GL thread is done with it, encoding follows */
     CHANNEL_DONE,     /* worker: the answer; a sealed memfd for each thing that enum measure says */
     CHANNEL_RESIDENT, /* worker: the scenes in GPU memory, when they have changed */
     CHANNEL_JOB,      /* front end: descriptors: the scene's blob, `image_count` images, and the
                           reference's planes when there is something to compare with */
+    CHANNEL_CANCEL,   /* front end: nobody waits for this job; it is answered all the same */
     CHANNEL_DROP,     /* front end: the scene was deleted */
     CHANNEL_KINDS
 };
@@ -39,6 +42,7 @@ struct channel_warm {
 };
 struct channel_job {
     struct pen_request request;
+    uint64_t client; /* with whom its time on the device is shared; 0: a client of its own */
     uint32_t image_count;
     uint32_t measure;                             /* enum measure */
     uint8_t images[PEN_MAX_LIGHTS][PEN_ID_BYTES]; /* in the order of the descriptors */

@@ -6,6 +6,7 @@
 #include "server/base/clock.h"
 #include "server/workers/worker_encoder.h"
 #include "server/workers/worker_measure.h"
+#include "server/workers/worker_turns.h"
 #include <errno.h>
 #include <fcntl.h>
 #include <poll.h>
@@ -15,12 +16,23 @@
 #include <unistd.h>
 
 #define IDLE_BEFORE_WARM_UP_MS 10000 /* a replacement has work to catch up with first */
+#define MAX_WAITING CHANNEL_MAX_JOBS
+#define TELL_TURN_MS 250
 #define EXIT_REFUSED 2
 #define EXIT_LOST 3
 #define EXIT_PROTOCOL 4
 
+struct waiting {
+    struct channel_message message;
+    struct channel_fds fds;
+};
+
 struct worker {
     struct pen_renderer *renderer;
+    struct worker_turns *turns;
+    struct waiting waiting[MAX_WAITING]; /* for room, in the order of arrival */
+    uint32_t waiting_count;
+    uint64_t told_job, told_ns; /* whose turn it is, as told last */
     struct worker_encoder *encoder;
     enum worker_warm_up warm_up;      /* what is still to be done */
     struct channel_resident resident; /* as told last, most recently used first */
@@ -84,33 +96,60 @@ static bool load(struct worker *worker, const struct channel_job *job,
     return all;
 }
 
-/* False when the context is lost: the job stays unanswered and the daemon gives it to another. */
-static bool run_job(
-    struct worker *worker, const struct channel_message *message, const struct channel_fds *fds)
+static struct worker_item *make_item(const struct channel_message *message)
 {
     const struct channel_job *job = &message->job_data;
-    struct channel_message note = {CHANNEL_VERSION, CHANNEL_STARTED, message->job};
-    send_or_exit(&note);
     struct worker_item *item = pen_alloc_zero(1, sizeof *item);
-    struct pen_result *result = &item->message.result;
-    struct pen_error *error = &result->error;
     item->message.version = CHANNEL_VERSION;
     item->message.kind = CHANNEL_DONE;
     item->message.job = message->job;
+    item->message.result.completed = job->request;
     item->output = job->request.output;
     item->measure = job->measure;
     item->reference_fd = -1;
-    result->completed = job->request;
+    return item;
+}
+
+/* Hands a render that has ended to the encoders; failures too: they answer. False when the context
+ * is lost: the job stays unanswered and the daemon gives it to another. */
+static bool hand_over(struct worker *worker, struct worker_item *item)
+{
+    struct pen_renderer *renderer = worker->renderer;
+    struct pen_result *result = &item->message.result;
+    if (result->error.code != PEN_OK && pen_renderer_is_lost(renderer)) {
+        free(item);
+        return false;
+    }
+    result->completed.output = item->output;
+    result->stage_ms[PEN_STAGE_LOAD] = item->load_ms; /* the render started afresh */
+    result->scene_was_resident = item->was_resident;
+    result->device = *pen_renderer_device(renderer);
+    result->gpu_bytes = pen_renderer_gpu_bytes(renderer);
+    result->programs = pen_renderer_programs(renderer);
+    tell_resident(worker, result->completed.scene); /* before the answer, so that both agree */
+    send_or_exit(&(struct channel_message){CHANNEL_VERSION, CHANNEL_RENDERED, item->message.job});
+    worker_encoder_submit(worker->encoder, item);
+    return true;
+}
+
+/* As hand_over. */
+static bool begin_job(
+    struct worker *worker, const struct channel_message *message, const struct channel_fds *fds)
+{
+    const struct channel_job *job = &message->job_data;
+    send_or_exit(&(struct channel_message){CHANNEL_VERSION, CHANNEL_STARTED, message->job});
+    struct worker_item *item = make_item(message);
+    struct pen_error *error = &item->message.result.error;
     bool compares = measure_has_reference(job->measure);
     bool ok = job->image_count <= PEN_MAX_LIGHTS && job->measure <= MEASURE_NUMBERS &&
               fds->count == 1 + job->image_count + compares;
     if (!ok)
         pen_fail(error, PEN_INTERNAL, "", "The worker was handed an incomplete job.");
     ok = ok && pen_request_check(&job->request, pen_renderer_catalogue(), error);
-    bool was_resident = ok && pen_renderer_has_scene(worker->renderer, job->request.scene);
+    item->was_resident = ok && pen_renderer_has_scene(worker->renderer, job->request.scene);
     uint64_t start = clock_now_ns();
     ok = ok && load(worker, job, fds, error);
-    double load_ms = clock_ms(clock_now_ns() - start);
+    item->load_ms = (float)clock_ms(clock_now_ns() - start);
     struct pen_request request = job->request;
     if (ok && job->measure != MEASURE_PICTURE) {
         worker_measure_output(&request.output);
@@ -118,24 +157,80 @@ static bool run_job(
     }
     if (ok && compares)
         item->reference_fd = fcntl(fds->fd[1 + job->image_count], F_DUPFD_CLOEXEC, 3);
-    ok = ok && pen_renderer_render(worker->renderer, &request, &item->frame, result, error);
-    result->completed.output = job->request.output;
-    if (!ok && pen_renderer_is_lost(worker->renderer)) {
-        free(item);
-        return false;
-    }
-    if (!ok && error->code == PEN_OK)
-        pen_fail(error, PEN_INTERNAL, "", "The render failed without saying why.");
-    result->stage_ms[PEN_STAGE_LOAD] = (float)load_ms; /* after the render, which starts afresh */
-    result->scene_was_resident = was_resident;
-    result->device = *pen_renderer_device(worker->renderer);
-    result->gpu_bytes = pen_renderer_gpu_bytes(worker->renderer);
-    result->programs = pen_renderer_programs(worker->renderer);
-    tell_resident(worker, job->request.scene); /* before the answer, so that both agree */
-    note.kind = CHANNEL_RENDERED;
-    send_or_exit(&note);
-    worker_encoder_submit(worker->encoder, item); /* failures too: answers keep their order */
+    return (ok && worker_turns_begin(worker->turns, &request, job->client, item)) ||
+           hand_over(worker, item);
+}
+
+/* Begins it, or keeps it until there is room. */
+static bool take_job(
+    struct worker *worker, const struct channel_message *message, struct channel_fds *fds)
+{
+    if (!worker->waiting_count && worker_turns_have_room(worker->turns, &message->job_data.request))
+        return begin_job(worker, message, fds);
+    if (worker->waiting_count == MAX_WAITING)
+        _exit(EXIT_PROTOCOL); /* the daemon never sends so many */
+    struct waiting *waiting = &worker->waiting[worker->waiting_count++];
+    waiting->message = *message;
+    waiting->fds = *fds;
+    fds->count = 0; /* they are kept */
     return true;
+}
+
+static void forget_waiting(struct worker *worker, uint32_t i)
+{
+    channel_close_fds(&worker->waiting[i].fds);
+    worker->waiting_count--;
+    memmove(&worker->waiting[i], &worker->waiting[i + 1],
+        (worker->waiting_count - i) * sizeof *worker->waiting);
+}
+
+/* Begins what waited for room, in order. */
+static bool begin_waiting(struct worker *worker)
+{
+    bool alive = true;
+    while (alive && worker->waiting_count &&
+           worker_turns_have_room(worker->turns, &worker->waiting[0].message.job_data.request)) {
+        alive = begin_job(worker, &worker->waiting[0].message, &worker->waiting[0].fds);
+        forget_waiting(worker, 0);
+    }
+    return alive;
+}
+
+/* A job that is being encoded is not stopped any more. */
+static bool cancel_job(struct worker *worker, uint64_t job)
+{
+    struct worker_item *item = worker_turns_cancel(worker->turns, job);
+    for (uint32_t i = 0; !item && i < worker->waiting_count; i++)
+        if (worker->waiting[i].message.job == job) {
+            item = make_item(&worker->waiting[i].message);
+            pen_fail(&item->message.result.error, PEN_LOST, "", "Nobody waits for it.");
+            forget_waiting(worker, i);
+        }
+    return !item || hand_over(worker, item);
+}
+
+/* Tells the daemon whose turn it is: when that changes, and now and then as a sign of life. */
+static void tell_turn(struct worker *worker, uint64_t job)
+{
+    uint64_t now = clock_now_ns();
+    if (job == worker->told_job && now - worker->told_ns < TELL_TURN_MS * CLOCK_MS)
+        return;
+    worker->told_job = job;
+    worker->told_ns = now;
+    send_or_exit(&(struct channel_message){CHANNEL_VERSION, CHANNEL_TURN, job});
+}
+
+/* One turn of whoever is next. */
+static bool run_turn(struct worker *worker)
+{
+    if (!begin_waiting(worker))
+        return false;
+    uint64_t job = worker_turns_next(worker->turns);
+    if (!job)
+        return true;
+    tell_turn(worker, job);
+    struct worker_item *item = worker_turns_run(worker->turns);
+    return !item || hand_over(worker, item);
 }
 
 static void drop(struct worker *worker, const uint8_t scene[PEN_ID_BYTES])
@@ -144,32 +239,52 @@ static void drop(struct worker *worker, const uint8_t scene[PEN_ID_BYTES])
     tell_resident(worker, NULL);
 }
 
+static bool take_message(
+    struct worker *worker, const struct channel_message *message, struct channel_fds *fds)
+{
+    switch (message->kind) {
+    case CHANNEL_JOB:
+        return take_job(worker, message, fds);
+    case CHANNEL_CANCEL:
+        return cancel_job(worker, message->job);
+    case CHANNEL_DROP:
+        drop(worker, message->drop.scene);
+        return true;
+    default:
+        return true;
+    }
+}
+
 /* Returns the exit status once the daemon hangs up or the context is lost. */
 static int serve(struct worker *worker)
 {
     static struct channel_message message;
     struct channel_fds fds;
     for (;;) {
+        bool busy = worker_turns_next(worker->turns) || worker->waiting_count;
         struct pollfd watch = {CHANNEL_WORKER_FD, POLLIN, 0};
-        int n =
-            poll(&watch, 1, worker->warm_up == WORKER_WARM_UP_IDLE ? IDLE_BEFORE_WARM_UP_MS : -1);
-        if (n == 0) {
+        int n = poll(&watch, 1,
+            busy                                     ? 0
+            : worker->warm_up == WORKER_WARM_UP_IDLE ? IDLE_BEFORE_WARM_UP_MS
+                                                     : -1);
+        if (n == 0 && !busy) {
             warm_up(worker);
             continue;
         }
         if (n < 0 && errno == EINTR)
             continue;
-        int got = channel_receive(CHANNEL_WORKER_FD, &message, &fds);
-        if (got == 0 || (got < 0 && errno == ECONNRESET))
-            return 0;
-        if (got < 0)
-            return EXIT_PROTOCOL;
         bool alive = true;
-        if (message.kind == CHANNEL_JOB)
-            alive = run_job(worker, &message, &fds);
-        else if (message.kind == CHANNEL_DROP)
-            drop(worker, message.drop.scene);
-        channel_close_fds(&fds);
+        if (n != 0) {
+            int got = channel_receive(CHANNEL_WORKER_FD, &message, &fds);
+            if (got == 0 || (got < 0 && errno == ECONNRESET))
+                return 0;
+            if (got < 0)
+                return EXIT_PROTOCOL;
+            alive = take_message(worker, &message, &fds);
+            channel_close_fds(&fds);
+        } else {
+            alive = run_turn(worker);
+        }
         if (!alive)
             return EXIT_LOST;
     }
@@ -178,7 +293,7 @@ static int serve(struct worker *worker)
 int main(int argc, char **argv)
 {
     struct pen_renderer_config config = {0};
-    struct worker worker = {0};
+    static struct worker worker;
     for (int i = 1; i + 1 < argc; i += 2) {
         unsigned long long value = strtoull(argv[i + 1], NULL, 10);
         if (!strcmp(argv[i], "--device"))
@@ -205,6 +320,7 @@ int main(int argc, char **argv)
         send_or_exit(&hello);
         return EXIT_REFUSED;
     }
+    worker.turns = worker_turns_create(worker.renderer);
     worker.encoder = worker_encoder_create(CHANNEL_WORKER_FD);
     hello.kind = CHANNEL_HELLO;
     hello.hello.pid = (uint32_t)getpid();
@@ -217,6 +333,7 @@ int main(int argc, char **argv)
     worker_encoder_destroy(worker.encoder);
     if (status == EXIT_LOST)
         _exit(EXIT_LOST); /* nothing of a lost context is worth tidying */
+    worker_turns_destroy(worker.turns);
     pen_renderer_destroy(worker.renderer);
     return status;
 }

@@ -10,6 +10,8 @@ struct worker_item { /* allocated by the caller, freed by the encoder */
     uint32_t measure; /* enum measure */
     int reference_fd; /* planes to compare with, the item's own; -1: none */
     struct pen_frame frame;
+    float load_ms;
+    bool was_resident;
 };
 
 struct pen_bytes;

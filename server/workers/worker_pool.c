@@ -2,9 +2,8 @@
 #include "protocol/memory.h"
 #include "server/base/clock.h"
 #include "server/base/log.h"
-#include "server/workers/measured.h"
-#include "server/base/process.h"
 #include "server/workers/quarantine.h"
+#include "server/workers/worker_slot.h"
 #include <errno.h>
 #include <fcntl.h>
 #include <poll.h>
@@ -18,48 +17,15 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#define IN_FLIGHT 2    /* one renders while the other is encoded */
-#define MAX_KILLS 2    /* of one render, by its own fault */
-#define MAX_ATTEMPTS 6 /* of one render, when somebody else ends the workers */
+/* A render holds its targets while others have their turns: beside one of any size, the others may
+ * have so many pixels together. */
+#define PIXELS_BESIDE (8u << 20)
+#define WANTED_EVERY_MS 10 /* how often it is asked whether anybody still waits for what runs */
+#define MAX_KILLS 2        /* of one render, by its own fault */
+#define MAX_ATTEMPTS 6     /* of one render, when somebody else ends the workers */
 #define QUIT_MS 3000
 #define MAX_BACKOFF_MS 5000
 #define START_PATIENCE_NS (120 * CLOCK_S)
-#define MAX_DROPS 64
-
-enum phase { PHASE_SENT, PHASE_RENDERING, PHASE_ENCODING };
-
-struct flight {
-    struct render *render; /* NULL: free */
-    enum phase phase;
-    uint64_t since_ns; /* of the phase */
-};
-
-struct slot {
-    struct worker_pool *pool;
-    pthread_t thread;
-    int wake; /* eventfd */
-    uint32_t index;
-    uint8_t drops[MAX_DROPS][PEN_ID_BYTES]; /* guarded by pool->lock */
-    uint32_t drop_count;                    /* guarded by pool->lock */
-    struct channel_resident resident;       /* guarded by pool->lock */
-    struct pen_program_counts programs;     /* guarded by pool->lock */
-    /* Only the slot's thread: */
-    struct process process;
-    int socket;
-    bool said_hello, is_replacement, hung;
-    uint64_t spawned_ns, died_ns;
-    uint32_t failures; /* in a row, before a hello */
-    struct flight flights[IN_FLIGHT];
-};
-
-struct worker_pool {
-    struct worker_pool_config config;
-    struct quarantine *quarantine;
-    pthread_mutex_t lock; /* guards numbers, and what says so in the slots */
-    struct worker_pool_numbers numbers;
-    bool stopping; /* atomic */
-    struct slot slots[16];
-};
 
 static bool is_stopping(const struct worker_pool *pool)
 {
@@ -73,6 +39,8 @@ static void spawn(struct slot *slot)
     int pair[2];
     slot->spawned_ns = clock_now_ns();
     slot->said_hello = slot->hung = false;
+    slot->turn_job = 0;
+    slot->heard_ns = slot->spawned_ns;
     if (socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, pair)) {
         slot->failures++;
         return;
@@ -101,13 +69,6 @@ static void spawn(struct slot *slot)
     close(pair[1]);
 }
 
-static void finish(struct slot *slot, struct flight *flight, const struct outcome *outcome)
-{
-    struct render *render = flight->render;
-    flight->render = NULL;
-    scheduler_finish(slot->pool->config.scheduler, render, outcome);
-}
-
 static void count(struct worker_pool *pool, uint32_t *number)
 {
     pthread_mutex_lock(&pool->lock);
@@ -124,20 +85,31 @@ static void survive(struct slot *slot, struct flight *flight, bool guilty, bool 
     render->attempts += flight->phase != PHASE_SENT;
     render->kills += guilty && own_fault;
     bool give_up = render->kills >= MAX_KILLS || render->attempts >= MAX_ATTEMPTS;
-    if (guilty && (own_fault || give_up) &&
+    /* For what ends workers, not for what takes them long. */
+    if (guilty && !slot->hung && (own_fault || give_up) &&
         quarantine_blame(pool->quarantine, render->request.scene))
         log_event(LOG_ERROR, "a scene ended two workers and is refused from now on");
     if (is_stopping(pool)) {
         pen_fail(&outcome.error, PEN_UNAVAILABLE, "", "The service is shutting down.");
-        finish(slot, flight, &outcome);
+        worker_slot_finish(slot, flight, &outcome);
     } else if (give_up) {
         pen_fail(&outcome.error, PEN_INTERNAL, "", "Rendering this scene ends the renderer.");
-        finish(slot, flight, &outcome);
+        worker_slot_finish(slot, flight, &outcome);
     } else {
         count(pool, &pool->numbers.retries);
         flight->render = NULL;
         scheduler_return(pool->config.scheduler, render);
     }
+}
+
+static void log_suspect(const struct render *render)
+{
+    const struct pen_request *r = &render->request;
+    char scene[PEN_ID_HEX + 1];
+    pen_id_to_hex(r->scene, scene);
+    log_event(LOG_ERROR, "it was at work on render %llu: scene %s, %.31s, %u x %u x %u, %u lights",
+        (unsigned long long)render->id, scene, r->technique, r->width, r->height, r->antialias,
+        r->light_count);
 }
 
 /* The process has ended, or its socket has: collects it and settles what it had in hand. */
@@ -157,13 +129,14 @@ static void bury(struct slot *slot)
     slot->died_ns = clock_now_ns();
     bool outside = WIFSIGNALED(status) && !slot->hung &&
                    (WTERMSIG(status) == SIGKILL || WTERMSIG(status) == SIGTERM);
-    bool any_rendering = false;
-    for (int i = 0; i < IN_FLIGHT; i++)
-        any_rendering =
-            any_rendering || (slot->flights[i].render && slot->flights[i].phase == PHASE_RENDERING);
+    const struct flight *suspect = worker_slot_find(slot, slot->turn_job);
+    if (suspect && suspect->phase != PHASE_RENDERING)
+        suspect = NULL;
     if (!is_stopping(pool)) {
         log_event(LOG_ERROR, "worker %u %s%s", slot->index, slot->hung ? "hung and " : "",
             process_describe(status, text, sizeof text));
+        if (suspect)
+            log_suspect(suspect->render);
         pthread_mutex_lock(&pool->lock);
         pool->numbers.restarts++;
         pool->numbers.hangs += slot->hung;
@@ -181,173 +154,9 @@ static void bury(struct slot *slot)
         struct flight *flight = &slot->flights[i];
         if (!flight->render)
             continue;
-        enum phase suspect = any_rendering ? PHASE_RENDERING : PHASE_ENCODING;
-        survive(slot, flight, flight->phase == suspect, !outside);
-    }
-}
-
-static struct flight *find_flight(struct slot *slot, uint64_t job)
-{
-    for (int i = 0; i < IN_FLIGHT; i++)
-        if (slot->flights[i].render && slot->flights[i].render->id == job)
-            return &slot->flights[i];
-    return NULL;
-}
-
-static void on_hello(struct slot *slot, const struct channel_hello *hello)
-{
-    struct worker_pool *pool = slot->pool;
-    double back_ms = slot->died_ns ? clock_ms(clock_now_ns() - slot->died_ns) : 0;
-    slot->said_hello = true;
-    slot->failures = 0;
-    pthread_mutex_lock(&pool->lock);
-    struct worker_pool_numbers *numbers = &pool->numbers;
-    slot->programs = (struct pen_program_counts){0};
-    numbers->has_device = true;
-    numbers->warmed = numbers->warmed || !pool->config.warm_up;
-    numbers->device = hello->device;
-    numbers->device.renderer[sizeof numbers->device.renderer - 1] = 0;
-    numbers->device.version[sizeof numbers->device.version - 1] = 0;
-    numbers->device.platform[sizeof numbers->device.platform - 1] = 0;
-    numbers->create_ms = hello->create_ms;
-    numbers->up++;
-    numbers->pids[slot->index] = (int)slot->process.pid;
-    if (slot->died_ns)
-        numbers->back_ms = back_ms;
-    pthread_mutex_unlock(&pool->lock);
-    log_event(LOG_INFO, "worker %u (pid %d) renders on %s (%s%s), context in %.0f ms%s%.0f%s",
-        slot->index, (int)slot->process.pid, hello->device.renderer, hello->device.platform,
-        hello->device.software ? ", software" : "", hello->create_ms,
-        slot->died_ns ? ", back after " : ", up after ",
-        slot->died_ns ? back_ms : clock_ms(clock_now_ns() - slot->spawned_ns), " ms");
-}
-
-static void on_refused(struct slot *slot, struct pen_error refused)
-{
-    pen_error_receive(&refused);
-    log_event(LOG_ERROR, "worker %u: %s", slot->index, refused.message);
-    pthread_mutex_lock(&slot->pool->lock);
-    if (!slot->pool->numbers.has_device)
-        slot->pool->numbers.refused = refused;
-    pthread_mutex_unlock(&slot->pool->lock);
-}
-
-static void on_warm(struct slot *slot, const struct channel_warm *warm)
-{
-    struct worker_pool *pool = slot->pool;
-    pthread_mutex_lock(&pool->lock);
-    pool->numbers.warmed = true;
-    pool->numbers.warm_ms = warm->warm_ms;
-    pool->numbers.gpu_bytes = warm->gpu_bytes;
-    slot->programs = warm->programs;
-    pthread_mutex_unlock(&pool->lock);
-    log_event(LOG_INFO, "worker %u warmed up in %.0f ms: %u programs, about %.0f MiB", slot->index,
-        warm->warm_ms, warm->programs.kept, (double)warm->programs.bytes / (1 << 20));
-}
-
-/* Says in the log when programs begin to leave, and each time as many have left as are kept: then
- * requests differ in more ways than there is room for, and pay for their compiles. */
-static void take_programs(struct slot *slot, const struct pen_program_counts *now)
-{
-    pthread_mutex_lock(&slot->pool->lock);
-    uint32_t before = slot->programs.evicted;
-    slot->programs = *now;
-    pthread_mutex_unlock(&slot->pool->lock);
-    uint32_t step = now->kept ? now->kept : 1;
-    if ((now->evicted && !before) || now->evicted / step != before / step)
-        log_event(LOG_INFO,
-            "worker %u keeps %u programs, about %.0f MiB; of %u compiled, %u have left",
-            slot->index, now->kept, (double)now->bytes / (1 << 20), now->compiled, now->evicted);
-}
-
-static void on_done(
-    struct slot *slot, const struct channel_message *message, const struct channel_fds *fds)
-{
-    struct worker_pool *pool = slot->pool;
-    struct flight *flight = find_flight(slot, message->job);
-    if (!flight)
-        return;
-    struct pen_result result = message->result;
-    pen_error_receive(&result.error);
-    struct outcome outcome = {.error = result.error};
-    result.stage_ms[PEN_STAGE_QUEUE] =
-        (float)clock_ms(flight->render->taken_ns - flight->render->queued_ns);
-    pthread_mutex_lock(&pool->lock);
-    pool->numbers.gpu_bytes = result.gpu_bytes;
-    pthread_mutex_unlock(&pool->lock);
-    take_programs(slot, &result.programs);
-    outcome.result = &result;
-    if (outcome.error.code == PEN_OK && flight->render->measure != MEASURE_PICTURE) {
-        measured_take(flight->render->measure, fds, &outcome);
-        pool->config.on_measured(pool->config.context, &result);
-    } else if (outcome.error.code == PEN_OK) {
-        char tag[PEN_ID_HEX + 1];
-        picture_tag(&flight->render->request, &result.device, tag);
-        outcome.picture =
-            fds->count == 1 ? picture_create(fds->fd[0], &result, tag, &outcome.error) : NULL;
-        if (!outcome.picture)
-            pen_fail(&outcome.error, PEN_INTERNAL, "", "The worker handed over no image.");
-        else
-            pool->config.on_picture(pool->config.context, outcome.picture);
-    }
-    finish(slot, flight, &outcome);
-    measured_release(&outcome);
-}
-
-/* False when the worker is to be buried. */
-static bool on_message(
-    struct slot *slot, const struct channel_message *message, const struct channel_fds *fds)
-{
-    struct flight *flight = find_flight(slot, message->job);
-    switch (message->kind) {
-    case CHANNEL_HELLO:
-        if (!slot->said_hello)
-            on_hello(slot, &message->hello);
-        return true;
-    case CHANNEL_REFUSED:
-        on_refused(slot, message->refused);
-        return false;
-    case CHANNEL_WARM:
-        on_warm(slot, &message->warm);
-        return true;
-    case CHANNEL_STARTED:
-    case CHANNEL_RENDERED:
-        if (flight) {
-            flight->phase = message->kind == CHANNEL_STARTED ? PHASE_RENDERING : PHASE_ENCODING;
-            flight->since_ns = clock_now_ns();
-        }
-        return true;
-    case CHANNEL_RESIDENT:
-        pthread_mutex_lock(&slot->pool->lock);
-        slot->resident = message->resident;
-        if (slot->resident.count > CHANNEL_MAX_RESIDENT)
-            slot->resident.count = 0;
-        pthread_mutex_unlock(&slot->pool->lock);
-        return true;
-    case CHANNEL_DONE:
-        on_done(slot, message, fds);
-        return true;
-    default:
-        return false;
-    }
-}
-
-/* Reads everything that is there; false when the worker is to be buried. */
-static bool drain_socket(struct slot *slot)
-{
-    struct channel_message message;
-    struct channel_fds fds;
-    for (;;) {
-        struct pollfd watch = {slot->socket, POLLIN, 0};
-        if (poll(&watch, 1, 0) <= 0)
-            return true;
-        int got = channel_receive(slot->socket, &message, &fds);
-        if (got <= 0)
-            return false;
-        bool ok = on_message(slot, &message, &fds);
-        channel_close_fds(&fds);
-        if (!ok)
-            return false;
+        /* Who had the turn, or, with nobody at work, what was encoded. */
+        bool guilty = suspect ? flight == suspect : flight->phase == PHASE_ENCODING;
+        survive(slot, flight, guilty, !outside);
     }
 }
 
@@ -360,12 +169,14 @@ static bool dispatch(struct slot *slot, struct flight *flight, struct render *re
     struct outcome outcome = {0};
     flight->render = render;
     flight->phase = PHASE_SENT;
+    flight->cancelled = false;
     flight->since_ns = clock_now_ns();
     message.job_data.request = render->request;
     message.job_data.measure = render->measure;
+    message.job_data.client = render->client;
     if (!pool->config.open_job(pool->config.context, &message.job_data, &fds, &outcome.error)) {
         channel_close_fds(&fds);
-        finish(slot, flight, &outcome);
+        worker_slot_finish(slot, flight, &outcome);
         return true;
     }
     int reference = render->reference_fd > 0 ? fcntl(render->reference_fd, F_DUPFD_CLOEXEC, 3) : -1;
@@ -374,6 +185,30 @@ static bool dispatch(struct slot *slot, struct flight *flight, struct render *re
     bool ok = channel_send(slot->socket, &message, &fds);
     channel_close_fds(&fds);
     return ok;
+}
+
+/* Pixels that another render may have; 0: there is no place for one. */
+static uint64_t room(const struct slot *slot)
+{
+    uint64_t sum = 0, largest = 0;
+    uint32_t count = 0;
+    for (int i = 0; i < IN_FLIGHT; i++) {
+        const struct flight *flight = &slot->flights[i];
+        if (!flight->render || flight->phase == PHASE_ENCODING)
+            continue;
+        const struct pen_request *r = &flight->render->request;
+        uint64_t pixels = (uint64_t)r->width * r->height;
+        largest = pixels > largest ? pixels : largest;
+        sum += pixels;
+        count++;
+    }
+    if (count == IN_TURNS)
+        return 0;
+    uint64_t others = sum - largest;
+    /* The new one may become the largest when what is there now fits beside it. */
+    if (sum <= PIXELS_BESIDE)
+        return UINT64_MAX;
+    return others < PIXELS_BESIDE ? PIXELS_BESIDE - others : 0;
 }
 
 static bool feed(struct slot *slot)
@@ -393,7 +228,9 @@ static bool feed(struct slot *slot)
     }
     for (int i = 0; i < IN_FLIGHT; i++) {
         while (!slot->flights[i].render) {
-            struct render *render = scheduler_take(pool->config.scheduler);
+            uint64_t most_pixels = room(slot);
+            struct render *render =
+                most_pixels ? scheduler_take(pool->config.scheduler, most_pixels) : NULL;
             if (!render)
                 return true;
             if (!dispatch(slot, &slot->flights[i], render))
@@ -403,7 +240,32 @@ static bool feed(struct slot *slot)
     return true;
 }
 
-/* A worker hangs when something has been under way for too long and nobody can still want it. */
+/* Stops what nobody waits for any more; false when the worker is to be buried. */
+static bool cancel_unwanted(struct slot *slot)
+{
+    for (int i = 0; i < IN_FLIGHT; i++) {
+        struct flight *flight = &slot->flights[i];
+        if (!flight->render || flight->cancelled || flight->phase == PHASE_ENCODING ||
+            scheduler_is_wanted(slot->pool->config.scheduler, flight->render))
+            continue;
+        flight->cancelled = true;
+        count(slot->pool, &slot->pool->numbers.cancelled);
+        struct channel_message message = {CHANNEL_VERSION, CHANNEL_CANCEL, flight->render->id};
+        if (!channel_send(slot->socket, &message, NULL))
+            return false;
+    }
+    return true;
+}
+
+static bool is_at_work(const struct slot *slot)
+{
+    for (int i = 0; i < IN_FLIGHT; i++)
+        if (slot->flights[i].render)
+            return true;
+    return false;
+}
+
+/* A worker hangs when it has work and gives no sign of life for longer than any piece of it takes. */
 static bool is_hung(const struct slot *slot, uint64_t now)
 {
     uint64_t patience = slot->pool->config.hang_timeout_ms * CLOCK_MS;
@@ -411,14 +273,16 @@ static bool is_hung(const struct slot *slot, uint64_t now)
     uint64_t start = patience > START_PATIENCE_NS ? patience : START_PATIENCE_NS;
     if (!slot->said_hello)
         return now - slot->spawned_ns > start;
+    uint64_t since = slot->heard_ns;
+    bool sent_only = true;
     for (int i = 0; i < IN_FLIGHT; i++) {
         const struct flight *flight = &slot->flights[i];
-        uint64_t limit = flight->phase == PHASE_SENT ? start : patience;
-        if (flight->render && now - flight->since_ns > limit &&
-            now > flight->render->last_deadline_ns)
-            return true;
+        if (!flight->render)
+            continue;
+        sent_only &= flight->phase == PHASE_SENT;
+        since = flight->since_ns > since ? flight->since_ns : since;
     }
-    return false;
+    return is_at_work(slot) && now - since > (sent_only ? start : patience);
 }
 
 static int timeout_ms(uint64_t next_ns)
@@ -448,7 +312,10 @@ static void *run(void *argument)
         bool alive = slot->process.pid != 0;
         struct pollfd watch[] = {{slot->wake, POLLIN, 0}, {alive ? slot->socket : -1, POLLIN, 0},
             {alive ? slot->process.pidfd : -1, POLLIN, 0}};
-        poll(watch, 3, alive ? timeout_ms(next) : 20);
+        int wait_ms = alive ? timeout_ms(next) : 20;
+        if (alive && is_at_work(slot) && wait_ms > WANTED_EVERY_MS)
+            wait_ms = WANTED_EVERY_MS;
+        poll(watch, 3, wait_ms);
         if (watch[0].revents && read(slot->wake, &ignored, sizeof ignored) < 0 && errno != EAGAIN)
             abort();
         if (!alive)
@@ -459,9 +326,9 @@ static void *run(void *argument)
             process_wait(&slot->process, -1, &(int){0});
         }
         /* What a dead worker said last still counts: the socket is emptied before the funeral. */
-        bool ok = drain_socket(slot);
-        if (slot->hung || !ok || (watch[2].revents && !drain_socket(slot)) ||
-            (slot->said_hello && !feed(slot)))
+        bool ok = worker_slot_hear(slot);
+        if (slot->hung || !ok || (watch[2].revents && !worker_slot_hear(slot)) ||
+            (slot->said_hello && (!cancel_unwanted(slot) || !feed(slot))))
             bury(slot);
     }
     if (slot->process.pid) {

@@ -118,7 +118,7 @@ class Faults(unittest.TestCase):
 
     def test_hung_worker_is_replaced(self):
         self.d.stop()
-        self.d.flags.append("--hang-timeout-ms=700")
+        self.d.flags.append("--hang-timeout-ms=4000")
         self.d.start()
         scene = self.d.upload(grid_scene(4))
         self.assertEqual(self.d.render(scene, SMALL).status, 200)

@@ -15,6 +15,9 @@ import harness
 from harness import HEAVY, PATIENCE, SMALL, Daemon, grid_scene, wait
 
 
+IN_TURNS = 4  # renders that a worker takes at a time
+
+
 class Crowd:
     """Requests that run at the same time."""
 
@@ -49,11 +52,11 @@ class Limits(unittest.TestCase):
         d.render(scene, SMALL)  # the worker is up
         crowd = Crowd()
         with d.paused():
-            for n in range(4):  # two with the worker, two in the queue
+            for n in range(IN_TURNS + 2):  # the last two are in the queue
                 crowd.add(d.render, scene, self.brief(n))
                 wait(lambda: d.metric("penumbra_renders_running") +
                      d.metric("penumbra_queue_depth") > n)
-            full = d.render(scene, self.brief(9))
+            full = d.render(scene, self.brief(99))
             self.assertEqual(full.status, 503, full.body)
             self.assertGreaterEqual(int(full.headers["Retry-After"]), 1)
             self.assertTrue(full.json()["retryable"])
@@ -91,7 +94,7 @@ class Limits(unittest.TestCase):
             self.assertEqual(refused.status, 429, refused.body)
             self.assertGreaterEqual(int(refused.headers["Retry-After"]), 1)
             crowd.add(d.render, scene, SMALL, **bob)
-            wait(lambda: d.metric("penumbra_queue_depth") == 1)
+            wait(lambda: d.metric("penumbra_renders_running") == 3)
         self.assertEqual({a.status for a in crowd.join()}, {200})
         self.assertEqual(d.render(scene, SMALL, **alice).status, 200)
         self.assertNotIn("alices-token", d.log())
@@ -135,9 +138,9 @@ class Limits(unittest.TestCase):
 
         crowd = Crowd()
         with d.paused():
-            for n in range(2):
+            for n in range(IN_TURNS):
                 crowd.add(ask, "first", self.brief(n))
-            wait(lambda: d.metric("penumbra_renders_running") == 2)
+            wait(lambda: d.metric("penumbra_renders_running") == IN_TURNS)
             for n in range(3):
                 crowd.add(ask, "batch", dict(HEAVY, exposure_ev=n, priority="batch",
                                                  deadline_ms=600000))

@@ -31,6 +31,6 @@ ${calls}}
     penumbra_unit_test(destroy ${CMAKE_CURRENT_BINARY_DIR}/destroy.c
         ${CMAKE_SOURCE_DIR}/server/workers/worker_encoder.c
         ${CMAKE_SOURCE_DIR}/server/workers/worker_item.c
-        ${CMAKE_SOURCE_DIR}/server/workers/worker_measure.c
+        ${CMAKE_SOURCE_DIR}/server/workers/worker_measure.c ${CMAKE_SOURCE_DIR}/server/workers/worker_turns.c
         LIBS penumbra_server penumbra_renderer penumbra_encode penumbra_metrics)
 endif()

@@ -49,7 +49,7 @@ static bool submit(struct scheduler *s, struct client *client, uint8_t key, bool
 
 static uint32_t take_and_finish(struct scheduler *s, uint32_t code)
 {
-    struct render *render = scheduler_take(s);
+    struct render *render = scheduler_take(s, UINT64_MAX);
     if (!render)
         return 0;
     uint32_t width = render->request.width;
@@ -70,7 +70,7 @@ static void test_order(void)
 {
     struct scheduler *s = make(100, 0);
     struct client c[24];
-    CHECK(scheduler_take(s) == NULL);
+    CHECK(scheduler_take(s, UINT64_MAX) == NULL);
     for (uint8_t i = 0; i < 4; i++)
         CHECK(submit(s, &c[i], 100 + i, true, true, 1, 1000, NULL));
     for (uint8_t i = 4; i < 24; i++)
@@ -140,7 +140,7 @@ static void test_sharing(void)
     CHECK(submit(s, &a, 1, true, true, 1, 1000, NULL));
     CHECK(submit(s, &d, 2, true, true, 1, 1000, NULL));
     CHECK(submit(s, &b, 2, false, true, 2, 1000, NULL)); /* lifts the batch render it joins */
-    struct render *render = scheduler_take(s);
+    struct render *render = scheduler_take(s, UINT64_MAX);
     CHECK(render && render->request.width == 2);
     CHECK(submit(s, &c, 2, false, false, 3, 1000, NULL)); /* wants its own */
     struct client late;
@@ -159,7 +159,7 @@ static void test_time(void)
     struct scheduler *s = make(10, 0);
     struct client queued, running, patient;
     CHECK(submit(s, &running, 1, false, true, 1, 20, NULL));
-    struct render *render = scheduler_take(s);
+    struct render *render = scheduler_take(s, UINT64_MAX);
     CHECK(submit(s, &queued, 2, false, true, 1, 20, NULL));
     CHECK(submit(s, &patient, 3, false, true, 1, 60000, NULL));
     uint64_t next = scheduler_expire(s);
@@ -178,7 +178,7 @@ static void test_time(void)
     CHECK(n.expired == 2 && n.queued == 1 && n.running == 0 && n.waiting == 1);
     scheduler_cancel(s);
     CHECK(patient.answers == 1 && patient.code == PEN_UNAVAILABLE);
-    CHECK(scheduler_take(s) == NULL);
+    CHECK(scheduler_take(s, UINT64_MAX) == NULL);
     scheduler_destroy(s);
 }
 
@@ -188,17 +188,17 @@ static void test_return_and_gone(void)
     struct client a, b, gone;
     CHECK(submit(s, &a, 1, false, true, 1, 1000, NULL));
     CHECK(submit(s, &b, 2, false, true, 1, 1000, NULL));
-    struct render *render = scheduler_take(s);
+    struct render *render = scheduler_take(s, UINT64_MAX);
     render->attempts = 1;
     scheduler_return(s, render); /* first again */
-    render = scheduler_take(s);
+    render = scheduler_take(s, UINT64_MAX);
     CHECK(render->request.width == 1 && render->attempts == 1);
     struct outcome outcome = {0};
     scheduler_finish(s, render, &outcome);
     CHECK(submit(s, &gone, 3, false, true, 1, 1000, NULL));
     gone.gone = true;
     CHECK(take_and_finish(s, 0) == 2);
-    CHECK(scheduler_take(s) == NULL);
+    CHECK(scheduler_take(s, UINT64_MAX) == NULL);
     CHECK(gone.answers == 1 && gone.code == PEN_TIMEOUT && a.answers == 1 && b.answers == 1);
     struct scheduler_numbers n;
     scheduler_read(s, &n);
@@ -233,7 +233,7 @@ static void *worker(void *argument)
     uint32_t n = 0;
     while (!__atomic_load_n(&crowd_done, __ATOMIC_ACQUIRE)) {
         scheduler_expire(s);
-        struct render *render = scheduler_take(s);
+        struct render *render = scheduler_take(s, UINT64_MAX);
         struct outcome outcome = {0};
         if (!render)
             usleep(20);

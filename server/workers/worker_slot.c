@@ -1,0 +1,181 @@
+#include "server/workers/worker_slot.h"
+#include "server/base/clock.h"
+#include "server/base/log.h"
+#include "server/workers/measured.h"
+#include <poll.h>
+
+void worker_slot_finish(struct slot *slot, struct flight *flight, const struct outcome *outcome)
+{
+    struct render *render = flight->render;
+    flight->render = NULL;
+    scheduler_finish(slot->pool->config.scheduler, render, outcome);
+}
+
+struct flight *worker_slot_find(struct slot *slot, uint64_t job)
+{
+    for (int i = 0; i < IN_FLIGHT; i++)
+        if (slot->flights[i].render && slot->flights[i].render->id == job)
+            return &slot->flights[i];
+    return NULL;
+}
+
+static void on_hello(struct slot *slot, const struct channel_hello *hello)
+{
+    struct worker_pool *pool = slot->pool;
+    double back_ms = slot->died_ns ? clock_ms(clock_now_ns() - slot->died_ns) : 0;
+    slot->said_hello = true;
+    slot->failures = 0;
+    pthread_mutex_lock(&pool->lock);
+    struct worker_pool_numbers *numbers = &pool->numbers;
+    slot->programs = (struct pen_program_counts){0};
+    numbers->has_device = true;
+    numbers->warmed = numbers->warmed || !pool->config.warm_up;
+    numbers->device = hello->device;
+    numbers->device.renderer[sizeof numbers->device.renderer - 1] = 0;
+    numbers->device.version[sizeof numbers->device.version - 1] = 0;
+    numbers->device.platform[sizeof numbers->device.platform - 1] = 0;
+    numbers->create_ms = hello->create_ms;
+    numbers->up++;
+    numbers->pids[slot->index] = (int)slot->process.pid;
+    if (slot->died_ns)
+        numbers->back_ms = back_ms;
+    pthread_mutex_unlock(&pool->lock);
+    log_event(LOG_INFO, "worker %u (pid %d) renders on %s (%s%s), context in %.0f ms%s%.0f%s",
+        slot->index, (int)slot->process.pid, hello->device.renderer, hello->device.platform,
+        hello->device.software ? ", software" : "", hello->create_ms,
+        slot->died_ns ? ", back after " : ", up after ",
+        slot->died_ns ? back_ms : clock_ms(clock_now_ns() - slot->spawned_ns), " ms");
+}
+
+static void on_refused(struct slot *slot, struct pen_error refused)
+{
+    pen_error_receive(&refused);
+    log_event(LOG_ERROR, "worker %u: %s", slot->index, refused.message);
+    pthread_mutex_lock(&slot->pool->lock);
+    if (!slot->pool->numbers.has_device)
+        slot->pool->numbers.refused = refused;
+    pthread_mutex_unlock(&slot->pool->lock);
+}
+
+static void on_warm(struct slot *slot, const struct channel_warm *warm)
+{
+    struct worker_pool *pool = slot->pool;
+    pthread_mutex_lock(&pool->lock);
+    pool->numbers.warmed = true;
+    pool->numbers.warm_ms = warm->warm_ms;
+    pool->numbers.gpu_bytes = warm->gpu_bytes;
+    slot->programs = warm->programs;
+    pthread_mutex_unlock(&pool->lock);
+    log_event(LOG_INFO, "worker %u warmed up in %.0f ms: %u programs, about %.0f MiB", slot->index,
+        warm->warm_ms, warm->programs.kept, (double)warm->programs.bytes / (1 << 20));
+}
+
+/* Says in the log when programs begin to leave, and each time as many have left as are kept: then
+ * requests differ in more ways than there is room for, and pay for their compiles. */
+static void take_programs(struct slot *slot, const struct pen_program_counts *now)
+{
+    pthread_mutex_lock(&slot->pool->lock);
+    uint32_t before = slot->programs.evicted;
+    slot->programs = *now;
+    pthread_mutex_unlock(&slot->pool->lock);
+    uint32_t step = now->kept ? now->kept : 1;
+    if ((now->evicted && !before) || now->evicted / step != before / step)
+        log_event(LOG_INFO,
+            "worker %u keeps %u programs, about %.0f MiB; of %u compiled, %u have left",
+            slot->index, now->kept, (double)now->bytes / (1 << 20), now->compiled, now->evicted);
+}
+
+static void on_done(
+    struct slot *slot, const struct channel_message *message, const struct channel_fds *fds)
+{
+    struct worker_pool *pool = slot->pool;
+    struct flight *flight = worker_slot_find(slot, message->job);
+    if (!flight)
+        return;
+    struct pen_result result = message->result;
+    pen_error_receive(&result.error);
+    struct outcome outcome = {.error = result.error};
+    result.stage_ms[PEN_STAGE_QUEUE] =
+        (float)clock_ms(flight->render->taken_ns - flight->render->queued_ns);
+    pthread_mutex_lock(&pool->lock);
+    pool->numbers.gpu_bytes = result.gpu_bytes;
+    pthread_mutex_unlock(&pool->lock);
+    take_programs(slot, &result.programs);
+    outcome.result = &result;
+    if (outcome.error.code == PEN_OK && flight->render->measure != MEASURE_PICTURE) {
+        measured_take(flight->render->measure, fds, &outcome);
+        pool->config.on_measured(pool->config.context, &result);
+    } else if (outcome.error.code == PEN_OK) {
+        char tag[PEN_ID_HEX + 1];
+        picture_tag(&flight->render->request, &result.device, tag);
+        outcome.picture =
+            fds->count == 1 ? picture_create(fds->fd[0], &result, tag, &outcome.error) : NULL;
+        if (!outcome.picture)
+            pen_fail(&outcome.error, PEN_INTERNAL, "", "The worker handed over no image.");
+        else
+            pool->config.on_picture(pool->config.context, outcome.picture);
+    }
+    worker_slot_finish(slot, flight, &outcome);
+    measured_release(&outcome);
+}
+
+/* False when the worker is to be buried. */
+static bool on_message(
+    struct slot *slot, const struct channel_message *message, const struct channel_fds *fds)
+{
+    struct flight *flight = worker_slot_find(slot, message->job);
+    slot->heard_ns = clock_now_ns();
+    switch (message->kind) {
+    case CHANNEL_HELLO:
+        if (!slot->said_hello)
+            on_hello(slot, &message->hello);
+        return true;
+    case CHANNEL_REFUSED:
+        on_refused(slot, message->refused);
+        return false;
+    case CHANNEL_WARM:
+        on_warm(slot, &message->warm);
+        return true;
+    case CHANNEL_TURN:
+        slot->turn_job = message->job;
+        return true;
+    case CHANNEL_STARTED:
+    case CHANNEL_RENDERED:
+        slot->turn_job = message->kind == CHANNEL_STARTED ? message->job : 0;
+        if (flight) {
+            flight->phase = message->kind == CHANNEL_STARTED ? PHASE_RENDERING : PHASE_ENCODING;
+            flight->since_ns = clock_now_ns();
+        }
+        return true;
+    case CHANNEL_RESIDENT:
+        pthread_mutex_lock(&slot->pool->lock);
+        slot->resident = message->resident;
+        if (slot->resident.count > CHANNEL_MAX_RESIDENT)
+            slot->resident.count = 0;
+        pthread_mutex_unlock(&slot->pool->lock);
+        return true;
+    case CHANNEL_DONE:
+        on_done(slot, message, fds);
+        return true;
+    default:
+        return false;
+    }
+}
+
+bool worker_slot_hear(struct slot *slot)
+{
+    struct channel_message message;
+    struct channel_fds fds;
+    for (;;) {
+        struct pollfd watch = {slot->socket, POLLIN, 0};
+        if (poll(&watch, 1, 0) <= 0)
+            return true;
+        int got = channel_receive(slot->socket, &message, &fds);
+        if (got <= 0)
+            return false;
+        bool ok = on_message(slot, &message, &fds);
+        channel_close_fds(&fds);
+        if (!ok)
+            return false;
+    }
+}

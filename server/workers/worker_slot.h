@@ -1,0 +1,56 @@
+/* One worker as its thread in the pool sees it, and what the worker says. */
+#pragma once
+#include "server/base/process.h"
+#include "server/workers/worker_figures.h"
+#include <pthread.h>
+
+/* Renders that take turns, and some that are encoded meanwhile. */
+#define IN_TURNS PEN_MAX_RENDERS
+#define IN_FLIGHT (IN_TURNS + 2)
+_Static_assert(IN_FLIGHT <= CHANNEL_MAX_JOBS, "a worker keeps that many");
+#define MAX_DROPS 64
+
+enum phase { PHASE_SENT, PHASE_RENDERING, PHASE_ENCODING };
+
+struct flight {
+    struct render *render; /* NULL: free */
+    enum phase phase;
+    uint64_t since_ns; /* of the phase */
+    bool cancelled;    /* the worker was told */
+};
+
+struct worker_pool;
+
+struct slot {
+    struct worker_pool *pool;
+    pthread_t thread;
+    int wake; /* eventfd */
+    uint32_t index;
+    uint8_t drops[MAX_DROPS][PEN_ID_BYTES]; /* guarded by pool->lock */
+    uint32_t drop_count;                    /* guarded by pool->lock */
+    struct channel_resident resident;       /* guarded by pool->lock */
+    struct pen_program_counts programs;     /* guarded by pool->lock */
+    /* Only the slot's thread: */
+    struct process process;
+    int socket;
+    bool said_hello, is_replacement, hung;
+    uint64_t turn_job;                      /* whose turn it is; 0: nobody's */
+    uint64_t spawned_ns, died_ns, heard_ns; /* heard: the last sign of life */
+    uint32_t failures;                      /* in a row, before a hello */
+    struct flight flights[IN_FLIGHT];
+};
+
+struct worker_pool {
+    struct worker_pool_config config;
+    struct quarantine *quarantine;
+    pthread_mutex_t lock; /* guards numbers, and what says so in the slots */
+    struct worker_pool_numbers numbers;
+    bool stopping; /* atomic */
+    struct slot slots[16];
+};
+
+struct flight *worker_slot_find(struct slot *slot, uint64_t job); /* NULL: it is not in flight */
+/* Answers whoever waits for the flight's render; its place is free then. */
+void worker_slot_finish(struct slot *slot, struct flight *flight, const struct outcome *outcome);
+/* Reads everything that the worker has said; false when it is to be buried. */
+bool worker_slot_hear(struct slot *slot);

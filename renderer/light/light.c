@@ -122,12 +122,85 @@ static float across(const float row[4], const float p[3])
     return row[0] * p[0] + row[1] * p[1] + row[2] * p[2] + row[3];
 }
 
+/* The part of a polygon where dot(side, (x, y, z, 1)) >= 0, after Sutherland and Hodgman 1974;
+ * `to` has room for one corner more. */
+static int cut_polygon(float (*from)[3], int n, const float side[4], float (*to)[3])
+{
+    int count = 0;
+    for (int i = 0; i < n; i++) {
+        const float *a = from[i], *b = from[(i + 1) % n];
+        float at_a = glm_vec3_dot((float *)a, (float *)side) + side[3];
+        float at_b = glm_vec3_dot((float *)b, (float *)side) + side[3];
+        if (at_a >= 0)
+            memcpy(to[count++], a, sizeof *to);
+        if ((at_a >= 0) != (at_b >= 0))
+            glm_vec3_lerp((float *)a, (float *)b, at_a / (at_a - at_b), to[count++]);
+    }
+    return count;
+}
+
+/* Narrows `range`, the z of a backdrop, to where shadows can fall on it: within the window through
+ * which the light sees the casters, half as large again. A map's depths would else be those of a
+ * ground that reaches to the horizon. */
+static void narrow_backdrop(
+    const struct light_face *f, const float bounds[2][3], const float casters[2][3], float range[2])
+{
+    float window[2][2] = {{INFINITY, -INFINITY}, {INFINITY, -INFINITY}}; /* parallel: m; else x/z */
+    for (int i = 0; i < 8; i++) {
+        float c[3];
+        light_corner(f, casters, i, c);
+        if (!f->parallel && c[2] <= 0)
+            return; /* beside the light: seen through no window */
+        for (int k = 0; k < 2; k++) {
+            float at = f->parallel ? c[k] : c[k] / c[2];
+            window[k][0] = fminf(window[k][0], at);
+            window[k][1] = fmaxf(window[k][1], at);
+        }
+    }
+    int thin = 0;
+    for (int k = 1; k < 3; k++)
+        thin = bounds[1][k] - bounds[0][k] < bounds[1][thin] - bounds[0][thin] ? k : thin;
+    float least = INFINITY, most = -INFINITY;
+    for (int face = 0; face < 2; face++) {
+        float corners[2][8][3];
+        int n = 4, now = 0;
+        for (int i = 0; i < 4; i++) {
+            int u = i == 1 || i == 2, v = i >> 1;
+            int at = face << thin | u << (thin + 1) % 3 | v << (thin + 2) % 3;
+            light_corner(f, bounds, at, corners[0][i]);
+        }
+        for (int side = 0; side < 4; side++) {
+            int k = side >> 1;
+            float more = 0.25f * (window[k][1] - window[k][0]), sign = side & 1 ? -1 : 1;
+            float edge = window[k][side & 1] - sign * more, plane[4] = {0};
+            plane[k] = sign;
+            plane[f->parallel ? 3 : 2] = -sign * edge;
+            n = cut_polygon(corners[now], n, plane, corners[!now]);
+            now = !now;
+        }
+        for (int i = 0; i < n; i++) {
+            least = fminf(least, corners[now][i][2]);
+            most = fmaxf(most, corners[now][i][2]);
+        }
+    }
+    range[0] = fmaxf(range[0], least); /* nothing in the window: an empty range */
+    range[1] = fminf(range[1], most);
+}
+
 /* Nearest and farthest z of what lies in front of the light: by instance box and by meshlet sphere,
  * whichever is tighter. A near plane that is too close widens every blocker search. A face of a
  * cube only owns receivers with |x|, |y| <= z, so what is nearer than |x| or |y| less the emitter's
  * half extent casts on none of them. */
-static void geometry_range(const struct light_face *f, const struct scene *scene, float range[2])
+static void geometry_range(const struct light_face *f, const struct light *light,
+    const struct scene *scene, float range[2])
 {
+    const float *sun = light->source->type == PEN_LIGHT_SUN ? light->z : NULL;
+    bool alone = true; /* nothing but backdrops */
+    for (uint32_t i = 0; i < scene->blob.instance_count && alone; i++) {
+        float min[3], max[3];
+        scene_instance_bounds(scene, i, min, max);
+        alone = is_backdrop(scene, min, max, light->origin, sun);
+    }
     range[0] = INFINITY, range[1] = 0;
     for (uint32_t i = 0; i < scene->blob.instance_count; i++) {
         const struct psc_instance *instance = &scene->blob.instances[i];
@@ -138,12 +211,14 @@ static void geometry_range(const struct light_face *f, const struct scene *scene
             box_range(f, bounds, axis, box[axis]);
             scales[axis] = light_row(f, instance, axis, rows[axis]);
         }
+        if (!alone && !f->cube && is_backdrop(scene, bounds[0], bounds[1], light->origin, sun))
+            narrow_backdrop(f, bounds, light->casters, box[2]);
         for (uint32_t k = 0; k < p->meshlet_count; k++) {
             const struct psc_meshlet *m = &scene->blob.meshlets[p->first_meshlet + k];
             float z = across(rows[2], m->center);
             float near_z = fmaxf(z - scales[2] * m->radius, box[2][0]);
             float far_z = fminf(z + scales[2] * m->radius, box[2][1]);
-            if (far_z <= 0)
+            if (far_z <= 0 || near_z > far_z)
                 continue;
             range[1] = fmaxf(range[1], far_z);
             for (int axis = 0; f->cube && axis < 2; axis++) {
@@ -159,10 +234,10 @@ static void geometry_range(const struct light_face *f, const struct scene *scene
         range[0] = 0.5f * range[1];
 }
 
-static void fit_range(struct light_face *f, const struct scene *scene)
+static void fit_range(struct light_face *f, const struct light *light, const struct scene *scene)
 {
     float range[2];
-    geometry_range(f, scene, range);
+    geometry_range(f, light, scene, range);
     if (!(range[1] > 0))
         range[0] = 0.5f, range[1] = 1;
     f->far_z = range[1] * 1.001f + 1e-6f * fminf(scene_radius(scene), 1);
@@ -266,7 +341,7 @@ void light_face_cull(
 static void fit_face(struct light_face *f, const struct light *light, const struct scene *scene)
 {
     static const float center[2] = {0, 0};
-    fit_range(f, scene);
+    fit_range(f, light, scene);
     light_face_window(f, light->casters, center, f->rect);
 }
 

@@ -15,8 +15,9 @@ float light_pcf(Surface s, ReceiverPlane plane, HorizonBack back, vec2 uv, vec2 
     for (int i = 0; i < count; i++) {
         vec2 e = taps_next(t), offset = e * extent;
         float d = texture(shadow_map, uv + offset * inverse_size).r;
-        bool blocked = d < plane_depth(plane, offset, bias) && d > back_depth(back, offset);
-        float above = horizon_height(s.p, s.n, e) > 0.0 ? 1.0 : 0.0;
+        bool blocked = d < plane_depth(plane, offset, bias);
+        bool seen = d > back_depth(back, offset) && horizon_height(s.p, s.n, e) > 0.0;
+        float above = seen ? 1.0 : 0.0;
         lit += blocked ? 0.0 : above;
         all += above;
     }

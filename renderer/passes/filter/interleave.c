@@ -22,10 +22,13 @@ static bool interleaved(
     struct pass_screen first = *pass;
     first.defines = defines;
     first.framebuffer = target->framebuffer;
+    char second_defines[64];
+    snprintf(second_defines, sizeof second_defines, "%s%s", colour ? "#define COLOUR\n" : "",
+        run->face->cube ? "#define CUBE\n" : "");
     struct pass_texture source = {UNIT_SOURCE, target->texture.name, GL_SAMPLE_NEAREST};
     struct pass_screen second = {.name = "interleave",
         .body = "interleave.glsl",
-        .defines = colour ? "#define COLOUR\n" : NULL,
+        .defines = second_defines,
         .textures = &source,
         .texture_count = 1,
         .tiles = pass->tiles};

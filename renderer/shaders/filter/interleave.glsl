@@ -55,6 +55,10 @@ vec4 visibility(Surface s)
         vec4 v = load(at, width);
         float d = texelFetch(g_depth, at, 0).r;
         float same = abs(d - (s.depth + dot(g, vec2(offset)))) < 0.01 * s.depth ? 1.0 : 0.0;
+#ifdef CUBE // other faces' receivers are not in this one's answers
+        vec3 p = unproject(light.clip_to_light, pixel_to_ndc(at), max(d, 1e-20));
+        same *= max(abs(p.x), abs(p.y)) <= p.z ? 1.0 : 0.0;
+#endif
         same *= (abs(offset.x) == 2 ? 0.5 : 1.0) * (abs(offset.y) == 2 ? 0.5 : 1.0);
         sum += same * v;
         weight += same;

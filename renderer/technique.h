@@ -81,6 +81,12 @@ struct technique_run {
     GLuint variance_framebuffer;
     /* What record tells the frame: */
     const struct gl_texture *tiles; /* classes, of pass_classify; NULL: not classified */
+    struct {
+        uint32_t map_size;    /* of the map that proves it; 0: the method's answer stands */
+        float texels, pixels; /* how far beyond the light's image the method may look */
+        uint32_t window;      /* enum bound_window */
+        bool late;            /* vis is written with the last face of the light */
+    } bound;                  /* what pass_bound may hold the answer to */
     bool work_counted; /* result->full_work_pixels has this light; else every receiver counts */
 };
 

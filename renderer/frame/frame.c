@@ -6,6 +6,7 @@
 #include "renderer/light/meter.h"
 #include "renderer/passes/draw/gbuffer.h"
 #include "renderer/passes/draw/screen.h"
+#include "renderer/passes/map/bound.h"
 #include "renderer/passes/map/shadow_cache.h"
 #include <cglm/cglm.h>
 #include <math.h>
@@ -118,16 +119,39 @@ static bool resolve_emissions(struct frame *f, struct pen_error *error)
     return true;
 }
 
+static void aim_face(struct frame *f, struct light_face *face)
+{
+    struct technique_ctx *ctx = f->job->ctx;
+    glm_mat4_mul((vec4 *)face->world_to_light, f->view.clip_to_world, (vec4 *)face->clip_to_light);
+    gl.NamedBufferData(ctx->light_block, sizeof *face, face, GL_STREAM_DRAW);
+    gl.BindBufferBase(GL_UNIFORM_BUFFER, UBO_LIGHT, ctx->light_block);
+    gl.BindBufferBase(GL_UNIFORM_BUFFER, UBO_PARAMS, ctx->param_block);
+}
+
+/* Of a method that writes vis with its last face, all faces are bounded then. */
+static bool bound_faces(struct frame *f, struct technique_run *run, struct pen_error *error)
+{
+    struct light *light = &f->lights[run->light_index];
+    if (!run->bound.late || light->face_count == 1)
+        return pass_bound(run, error);
+    run->tiles = NULL; /* of one face */
+    for (uint32_t k = 0; k < light->face_count && pass_is_last_face(run); k++) {
+        struct technique_run each = *run;
+        each.face = &light->faces[k];
+        aim_face(f, &light->faces[k]);
+        if (!pass_bound(&each, error))
+            return false;
+    }
+    return true;
+}
+
 static bool record_face(
     struct frame *f, uint32_t light, uint32_t number, bool *counted, struct pen_error *error)
 {
     const struct frame_job *job = f->job;
     struct light_face *face = &f->lights[light].faces[number];
     struct technique_ctx *ctx = job->ctx;
-    glm_mat4_mul((vec4 *)face->world_to_light, f->view.clip_to_world, (vec4 *)face->clip_to_light);
-    gl.NamedBufferData(ctx->light_block, sizeof *face, face, GL_STREAM_DRAW);
-    gl.BindBufferBase(GL_UNIFORM_BUFFER, UBO_LIGHT, ctx->light_block);
-    gl.BindBufferBase(GL_UNIFORM_BUFFER, UBO_PARAMS, ctx->param_block);
+    aim_face(f, face);
     const struct emission *emission = f->emissions[light];
     struct technique_run run = {.ctx = ctx,
         .scene = job->scene,
@@ -153,8 +177,10 @@ static bool record_face(
         return false;
     *counted |= run.work_counted;
     f->classified |= run.tiles != NULL;
-    return !frame_layers_want_classes(job->request) ||
-           frame_layers_add_classes(job, run.tiles, number == 0, error);
+    const struct gl_texture *tiles = run.tiles;
+    return bound_faces(f, &run, error) &&
+           (!frame_layers_want_classes(job->request) ||
+               frame_layers_add_classes(job, tiles, number == 0, error));
 }
 
 static bool record_light(struct frame *f, uint32_t light, struct pen_error *error)

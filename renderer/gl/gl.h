@@ -9,7 +9,8 @@
     F(BINDBUFFERBASE, BindBufferBase) F(BINDBUFFERRANGE, BindBufferRange) F(BINDBUFFER, BindBuffer) \
     F(BINDFRAMEBUFFER, BindFramebuffer) F(BINDIMAGETEXTURE, BindImageTexture) \
     F(BINDSAMPLER, BindSampler) F(BINDTEXTUREUNIT, BindTextureUnit) \
-    F(BINDVERTEXARRAY, BindVertexArray) F(BLENDFUNC, BlendFunc) F(BLENDCOLOR, BlendColor) \
+    F(BINDVERTEXARRAY, BindVertexArray) F(BLENDEQUATION, BlendEquation) \
+    F(BLENDFUNC, BlendFunc) F(BLENDCOLOR, BlendColor) \
     F(CHECKNAMEDFRAMEBUFFERSTATUS, CheckNamedFramebufferStatus) \
     F(CLEARNAMEDFRAMEBUFFERFV, ClearNamedFramebufferfv) \
     F(CLEARNAMEDFRAMEBUFFERUIV, ClearNamedFramebufferuiv) \

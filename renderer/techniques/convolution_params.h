@@ -42,8 +42,10 @@ static inline bool convolution_screen(struct technique_run *run,
     const struct shadow_input *series = pass_convolution(run, desc, error);
     const struct shadow_input *min_max =
         series ? pass_caster_min_max(run, desc->size, error) : NULL;
-    struct classify_desc classes = {
-        .map_size = desc->size, .margin_texels = margin, .one_window = true};
+    struct classify_desc classes = {.map_size = desc->size,
+        .margin_texels = margin,
+        .one_window = true,
+        .bound = desc->weighted ? BOUND_LIGHT : BOUND_KERNEL};
     if (!min_max || (margin >= 0 && !pass_classify(run, &classes, &pass.tiles, error)))
         return false;
     bool tables = desc->format == CONVOLUTION_TABLES;

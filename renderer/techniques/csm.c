@@ -43,7 +43,7 @@ const struct technique technique_csm = {
                     "maps, Eurographics Symposium on Rendering 2007",
         .artefacts =
             "The width of the edge is that of the filter, whatever the light; light bleeds "
-            "where casters touch receivers, ripples at few terms.",
+            "within the filter's width of where casters touch receivers, ripples at few terms.",
         .cost_class = PEN_COST_CHEAP,
         .textured = false,
         .struct_size = sizeof(struct csm),

@@ -8,6 +8,7 @@ struct evsm {
     float negative_exponent;
     float min_deviation;
     float bleed;
+    pen_flag bounded;
 };
 
 static const struct pen_param rows[] = {
@@ -22,6 +23,7 @@ static const struct pen_param rows[] = {
         .help = "Least standard deviation of depth, in halves of the map's depth range."),
     PARAM(struct evsm, bleed, .def = 0, .min = 0, .max = 0.9,
         .help = "Visibility that counts as none; cuts light bleeding and narrows edges."),
+    BOUNDED_ROW(struct evsm),
 };
 
 static bool record(struct technique_run *run, struct pen_error *error)
@@ -31,7 +33,7 @@ static bool record(struct technique_run *run, struct pen_error *error)
         .kind = MOMENTS_EXPONENTIAL, .size = params->map_size, .blur = params->blur};
     desc.exponents[0] = params->positive_exponent;
     desc.exponents[1] = params->negative_exponent;
-    return moment_screen(run, &desc, "evsm", "evsm.glsl", error);
+    return moment_screen(run, &desc, params->bounded.on, "evsm", "evsm.glsl", error);
 }
 
 const struct technique technique_evsm = {

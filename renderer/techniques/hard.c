@@ -17,6 +17,8 @@ static bool record(struct technique_run *run, struct pen_error *error)
 {
     const struct hard *params = run->params;
     const struct shadow_input *map = pass_caster_map(run, params->map_size, error);
+    run->bound.map_size = params->map_size;
+    run->bound.texels = 1;
     return map && pass_screen(run,
                       &(struct pass_screen){
                           .name = "hard", .body = "hard.glsl", .shadow = &map->textures[0]},

@@ -9,3 +9,7 @@
 #define BIAS_ROW(aggregate)                                                                        \
     PARAM(aggregate, bias, .def = 0.0005, .min = 0, .max = 0.1,                                    \
         .help = "Depth bias as a fraction of the distance to the light.")
+/* Of methods whose filter lets light through; a pen_flag. */
+#define BOUNDED_ROW(aggregate)                                                                     \
+    PARAM(aggregate, bounded, .def = 1,                                                            \
+        .help = "Keeps dark what the exact depths prove to be; off: the filter as published.")

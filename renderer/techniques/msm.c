@@ -7,6 +7,7 @@ struct msm {
     uint32_t precision;
     float moment_bias;
     float bleed;
+    pen_flag bounded;
 };
 
 static const char *const precision_names[] = {"float32", "unorm16", NULL};
@@ -21,6 +22,7 @@ static const struct pen_param rows[] = {
         .help = "Share of a spread-out distribution mixed in against rounding; 0: by precision."),
     PARAM(struct msm, bleed, .def = 0, .min = 0, .max = 0.9,
         .help = "Visibility that counts as none; cuts light bleeding and narrows edges."),
+    BOUNDED_ROW(struct msm),
 };
 
 static bool record(struct technique_run *run, struct pen_error *error)
@@ -29,7 +31,7 @@ static bool record(struct technique_run *run, struct pen_error *error)
     struct moment_map desc = {.kind = params->precision ? MOMENTS_FOUR_UNORM : MOMENTS_FOUR,
         .size = params->map_size,
         .blur = params->blur};
-    return moment_screen(run, &desc, "msm", "msm.glsl", error);
+    return moment_screen(run, &desc, params->bounded.on, "msm", "msm.glsl", error);
 }
 
 const struct technique technique_msm = {

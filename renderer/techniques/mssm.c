@@ -9,6 +9,7 @@ struct mssm {
     float bleed;
     float min_filter;
     uint32_t max_window;
+    pen_flag bounded;
 };
 
 static const struct pen_param rows[] = {
@@ -24,6 +25,7 @@ static const struct pen_param rows[] = {
     PARAM(struct mssm, bleed, .def = 0, .min = 0, .max = 0.9,
         .help = "Visibility that counts as none; cuts light bleeding and narrows penumbrae."),
     SAT_ROWS(struct mssm, 256),
+    BOUNDED_ROW(struct mssm),
 };
 
 static bool record(struct technique_run *run, struct pen_error *error)
@@ -32,7 +34,7 @@ static bool record(struct technique_run *run, struct pen_error *error)
     struct sat_table table = {
         .kind = SAT_FOUR_MOMENTS, .map_size = params->map_size, .max_window = params->max_window};
     struct sat_lookup lookup;
-    if (!sat_prepare(run, &table, params->min_filter, &lookup, error))
+    if (!sat_prepare(run, &table, params->min_filter, params->bounded.on, &lookup, error))
         return false;
     return pass_screen(run,
         &(struct pass_screen){.name = "mssm",

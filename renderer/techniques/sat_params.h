@@ -21,14 +21,18 @@ struct sat_lookup {
 };
 
 static inline bool sat_prepare(struct technique_run *run, const struct sat_table *table,
-    float min_filter, struct sat_lookup *lookup, struct pen_error *error)
+    float min_filter, bool bounded, struct sat_lookup *lookup, struct pen_error *error)
 {
     const struct shadow_input *min_max = pass_min_max(run, table->map_size, error);
     const struct shadow_input *sat = min_max ? pass_sat(run, table, &lookup->block, error) : NULL;
-    struct classify_desc classes = {
-        .map_size = table->map_size, .margin_texels = min_filter + 1, .one_window = true};
+    struct classify_desc classes = {.map_size = table->map_size,
+        .margin_texels = min_filter + 1,
+        .one_window = true,
+        .bound = BOUND_LIGHT};
     if (!sat || !pass_classify(run, &classes, &lookup->tiles, error))
         return false;
+    if (!bounded)
+        run->bound.map_size = 0;
     lookup->textures[0] = (struct pass_texture){UNIT_SAT, sat->textures[0].name, GL_SAMPLE_NEAREST};
     lookup->textures[1] =
         (struct pass_texture){UNIT_MIN_MAX, min_max->textures[0].name, GL_SAMPLE_NEAREST};

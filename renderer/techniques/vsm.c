@@ -6,6 +6,7 @@ struct vsm {
     uint32_t blur;
     float min_variance;
     float bleed;
+    pen_flag bounded;
 };
 
 static const struct pen_param rows[] = {
@@ -16,6 +17,7 @@ static const struct pen_param rows[] = {
         .help = "Least variance of depth, in squares of the map's depth range."),
     PARAM(struct vsm, bleed, .def = 0.2, .min = 0, .max = 0.9,
         .help = "Visibility that counts as none; cuts light bleeding and narrows edges."),
+    BOUNDED_ROW(struct vsm),
 };
 
 static bool record(struct technique_run *run, struct pen_error *error)
@@ -23,7 +25,7 @@ static bool record(struct technique_run *run, struct pen_error *error)
     const struct vsm *params = run->params;
     struct moment_map desc = {
         .kind = MOMENTS_VARIANCE, .size = params->map_size, .blur = params->blur};
-    return moment_screen(run, &desc, "vsm", "vsm.glsl", error);
+    return moment_screen(run, &desc, params->bounded.on, "vsm", "vsm.glsl", error);
 }
 
 const struct technique technique_vsm = {
@@ -32,8 +34,8 @@ const struct technique technique_vsm = {
         .summary = "Blurs depth and its square in the map and bounds the share of light with "
                    "Chebyshev's inequality.",
         .citation = "W. Donnelly, A. Lauritzen, Variance shadow maps, I3D 2006",
-        .artefacts = "Light bleeds where a second caster lies behind the first; edges have the "
-                     "width of the blur whatever the light.",
+        .artefacts = "Light bleeds where a second caster lies behind the edge of the first; edges "
+                     "have the width of the blur whatever the light.",
         .cost_class = PEN_COST_CHEAP,
         .textured = false,
         .struct_size = sizeof(struct vsm),

@@ -16,6 +16,7 @@ struct vssm {
     float bleed;
     float min_filter;
     uint32_t max_window;
+    pen_flag bounded;
 };
 
 static const struct pen_param rows[] = {
@@ -38,6 +39,7 @@ static const struct pen_param rows[] = {
     PARAM(struct vssm, bleed, .def = 0, .min = 0, .max = 0.9,
         .help = "Visibility that counts as none; cuts light bleeding and narrows penumbrae."),
     SAT_ROWS(struct vssm, 512),
+    BOUNDED_ROW(struct vssm),
 };
 
 static bool record(struct technique_run *run, struct pen_error *error)
@@ -47,7 +49,7 @@ static bool record(struct technique_run *run, struct pen_error *error)
         .kind = SAT_VARIANCE, .map_size = params->map_size, .max_window = params->max_window};
     struct sat_lookup lookup;
     const struct shadow_input *map = pass_depth_map(run, params->map_size, error);
-    if (!map || !sat_prepare(run, &table, params->min_filter, &lookup, error))
+    if (!map || !sat_prepare(run, &table, params->min_filter, params->bounded.on, &lookup, error))
         return false;
     struct pass_screen pass = {.name = "vssm",
         .body = "vssm.glsl",

@@ -1,10 +1,10 @@
-"""Where surfaces touch, rays leave no lit seams."""
+"""Where surfaces touch, in closed rooms and on wide grounds, no light goes through what casts."""
 import math
 import unittest
 
 import harness
 from harness import Daemon
-from pictures import mesh_scene, rgb
+from pictures import box, mesh_scene, rgb
 
 WIDTH, HEIGHT = 640, 480
 
@@ -19,10 +19,35 @@ def wall_on_floor(turn):
                       [0, 1, 2, 0, 2, 3, 4, 5, 6, 4, 6, 7], material={"doubleSided": True})
 
 
+def solids(*boxes):
+    """A scene of boxes of this size about this centre, each turned about the vertical."""
+    points, normals, indices = [], [], []
+    for size, center, turn in boxes:
+        c, s = math.cos(turn), math.sin(turn)
+        first = len(points)
+        for values, into in zip(box(size, center), (points, normals)):
+            into += [[c * x + s * z, y, c * z - s * x] for x, y, z in values]
+        indices += [first + i for i in box()[2]]
+    return mesh_scene(points, normals, indices, material={"doubleSided": True})
+
+
+def rect(x, y, z):
+    return {"type": "rect", "position": [x, y, z], "target": [0, 0, 0], "width": 1, "height": 1}
+
+
+SUN = {"type": "sun", "target": [0, 0, 0], "angular_diameter_deg": 0.53, "irradiance": 3}
+# What is not worth its time here: as many maps as a picture needs.
+PARAMS = {"multisample": {"samples": 16}}
+# Answers for methods: the reference, and what draws no shadow or is another method.
+APART = ("raytraced", "none", "auto")
+
+
 class Contact(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.d = Daemon()
+        cls.methods = [t["name"] for t in cls.d.get("/v1/techniques").json()["techniques"]
+                       if t["name"] not in APART]
 
     @classmethod
     def tearDownClass(cls):
@@ -46,6 +71,87 @@ class Contact(unittest.TestCase):
                 self.assertEqual(answer.status, 200, answer.body[:300])
                 lit = [(i % WIDTH, i // WIDTH) for i, p in enumerate(rgb(answer)) if p[0] > 0]
                 self.assertEqual(lit, [], "turned by %.2f, %s" % (turn, backend))
+
+    def visibility(self, scene, request, method):
+        answer = self.d.render(scene, {
+            "width": 320, "height": 240, "ground": False, "output": {"layer": "visibility"},
+            **request, "technique": {"name": method, "params": PARAMS.get(method, {})}}, timeout=300)
+        self.assertEqual(answer.status, 200, answer.body[:300])
+        return [p[0] for p in rgb(answer)]
+
+    def check_dark(self, scene, request, methods, most=0):
+        """Everything in view lies in umbra."""
+        for method in methods:
+            with self.subTest(method=method, lights=request["lights"]):
+                lit = sum(v > 60 for v in self.visibility(scene, request, method))
+                self.assertLessEqual(lit, most)
+
+    def test_no_method_lights_the_seam_of_wall_and_floor(self):
+        for turn, thick in ((0.7, 0), (2.59, 0), (0.3, 0.05), (1.3, 0.002)):
+            c, s = math.cos(turn), math.sin(turn)
+            scene = self.d.upload(wall_on_floor(turn) if not thick else solids(
+                ((8, 2, thick), (0, 1, -thick / 2), turn), ((8, 0.1, 8), (0, -0.05, 0), turn)))
+
+            def turned(x, y, z):
+                return [c * x + s * z, y, c * z - s * x]
+
+            request = {"camera": {"eye": turned(0.4, 1.2, 3), "target": [0, 0.4, 0],
+                                  "fov_y_deg": 45}}
+            some = ["hard", "pcf", "pcss", "vsm"]
+            lights = [(rect(*turned(1, 4, -4)), self.methods if turn == 0.7 else some),
+                      ({**SUN, "position": turned(1, 3, -4)}, some),
+                      ({"type": "sphere", "position": turned(0.5, 4, -3), "radius": 0.4}, ["pcss"])]
+            for light, methods in lights:
+                # A sphere's light has six maps, which meet in the picture.
+                self.check_dark(scene, {**request, "lights": [light]}, methods,
+                                most=2 if light["type"] == "sphere" else 0)
+
+    def test_closed_room_is_dark(self):
+        scene = self.d.upload(solids(((4, 3, 4), (0, 1.5, 0), 0)))
+        self.check_dark(scene, {
+            "camera": {"eye": [1.5, 1.5, 1.5], "target": [-1.5, 0.8, -1.5], "fov_y_deg": 75},
+            "lights": [{**SUN, "position": [5, 7, 3]}]}, self.methods)
+
+    def test_box_keeps_its_shadow_on_a_wide_ground(self):
+        points, normals, indices = box((1, 1, 1), (0, 0.5, 0))
+        ground = [[-1000, 0, 1000], [1000, 0, 1000], [1000, 0, -1000], [-1000, 0, -1000]]
+        parts = [{"primitives": [{"attributes": {"POSITION": 0, "NORMAL": 1}, "indices": 3 + i,
+                                  "material": 0}]} for i in range(2)]
+        ranges = [{"bufferView": 2, "byteOffset": 144 * i, "componentType": 5125,
+                   "count": 6 if i else 36, "type": "SCALAR"} for i in range(2)]
+        scene = self.d.upload(mesh_scene(
+            points + ground, normals + [[0, 1, 0]] * 4, indices + [24, 25, 26, 24, 26, 27],
+            node={"mesh": 1}, nodes=[{"mesh": 2}], meshes=parts, accessors=ranges))
+        # The umbra in closed form: of the ground before the box, away from a light at (4, 5, -2),
+        # what lies 0.1 inside the shadow of the box's top, 0.8 to the side and 0.4 to the front.
+        camera = {"eye": [-0.6, 6, 0.3], "target": [-0.6, 0, 0.3], "up": [0, 0, -1],
+                  "fov_y_deg": 30}
+        scale = 240 / (2 * 6 * math.tan(math.radians(15)))
+        inside = []
+        for y in range(240):
+            for x in range(320):
+                at_x, at_z = (x + 0.5 - 160) / scale - 0.6, (y + 0.5 - 120) / scale + 0.3
+                if -1.2 < at_x < -0.6 and -0.1 < at_z + 0.5 * (at_x + 0.5) < 0.4:
+                    inside.append(y * 320 + x)
+        self.assertGreater(len(inside), 500)
+        request = {"camera": camera, "lights": [{**SUN, "position": [4, 5, -2]}]}
+        for method in self.methods:
+            seen = self.visibility(scene, request, method)
+            with self.subTest(method=method):
+                self.assertLessEqual(sum(seen[i] >= 128 for i in inside), 0.1 * len(inside))
+
+    def test_grazing_light_still_arrives(self):
+        scene = self.d.upload(solids(((2, 2, 4), (-1, 1, 0), 0), ((10, 0.1, 10), (0, -0.05, 0), 0)))
+        for x in (0.2, 0.3, 0.6):
+            request = {"camera": {"eye": [3, 1, 0.5], "target": [0, 0.9, 0], "fov_y_deg": 30},
+                       "lights": [rect(x, 4, 0)]}
+            truth = self.visibility(scene, request, "raytraced")
+            for method in ("hard", "pcf", "pcss", "erosion", "vsm"):
+                seen = self.visibility(scene, request, method)
+                with self.subTest(method=method, x=x):
+                    lit = [v for v, t in zip(seen, truth) if t > 235]
+                    self.assertGreater(len(lit), 10000)
+                    self.assertLess(sum(v < 120 for v in lit), 0.01 * len(lit))
 
 
 if __name__ == "__main__":

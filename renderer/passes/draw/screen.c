@@ -37,7 +37,7 @@ struct drawing {
     struct technique_ctx *ctx;
     GLuint program, framebuffer, extra;
     uint32_t width, height;
-    bool add, mute;
+    bool add, least, mute;
     const struct gl_texture *tiles; /* NULL: all pixels */
     int32_t tile_class;
     struct pass_texture own[4]; /* what a method's pass always reads */
@@ -73,6 +73,10 @@ static void draw_piece(const struct drawing *d, const struct pass_bands *bands)
         gl.Enable(GL_BLEND);
         gl.BlendFunc(GL_ONE, GL_ONE);
     }
+    if (d->least) {
+        gl.Enable(GL_BLEND);
+        gl.BlendEquation(GL_MIN);
+    }
     if (d->mute)
         gl.ColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_FALSE);
     pass_bands_aim(bands);
@@ -87,6 +91,7 @@ static void draw_piece(const struct drawing *d, const struct pass_bands *bands)
         gl.DrawArrays(GL_TRIANGLES, 0, 3);
     }
     gl.Disable(GL_BLEND);
+    gl.BlendEquation(GL_FUNC_ADD);
     gl.ColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
 }
 
@@ -150,6 +155,7 @@ bool pass_screen(struct technique_run *run, const struct pass_screen *pass, stru
         .width = run->width,
         .height = run->height,
         .add = pass->add,
+        .least = pass->least,
         .tiles = pass->tiles,
         .tile_class = TILE_UNDECIDED,
         .textures = pass->textures,

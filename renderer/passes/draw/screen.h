@@ -21,6 +21,7 @@ struct pass_screen {
     uint32_t texture_count;
     GLuint framebuffer;             /* 0: run->vis_framebuffer */
     bool add;                       /* blends ONE, ONE instead of replacing */
+    bool least;                     /* keeps the lesser of what is there and the new value */
     const struct gl_texture *tiles; /* of pass_classify: only undecided tiles are drawn; or NULL */
     const void *extra;              /* contents of the uniform block UBO_EXTRA, or NULL */
     uint32_t extra_bytes;

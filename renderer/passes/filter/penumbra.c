@@ -31,7 +31,8 @@ bool pass_penumbra_tiles(struct technique_run *run, uint32_t map_size, float mar
         .margin_texels = margin_texels,
         .umbra = true,
         .one_window = true,
-        .seams = true};
+        .seams = true,
+        .bound = BOUND_LIGHT};
     if (!pass_classify(run, &desc, tiles, error))
         return false;
     if (!*tiles)

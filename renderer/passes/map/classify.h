@@ -3,6 +3,7 @@
  * windows F3 and F4: skipping decided tiles changes no pixel. */
 #pragma once
 #include "renderer/passes/draw/tiles.h"
+#include "renderer/passes/map/bound.h"
 #include "renderer/technique.h"
 
 /* What a method needs to be true of a decided tile. */
@@ -18,7 +19,8 @@ struct classify_desc {
      * near the receiver to reach that far; or it filters depths, where only a window with nothing
      * nearer than the receivers answers 1. */
     bool one_window;
-    bool seams; /* It filters on the screen, over the seams of a cube's faces: all undecided. */
+    bool seams;     /* It filters on the screen, over the seams of a cube's faces: all undecided. */
+    uint32_t bound; /* enum bound_window, of methods that average depths */
 };
 
 /* Classifies run's face and writes 0 to the umbra tiles of vis. Adds the receivers to

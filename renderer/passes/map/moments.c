@@ -63,6 +63,7 @@ bool pass_moment_tiles(struct technique_run *run, const struct moment_map *map,
         &(struct classify_desc){.map_size = map->size,
             .margin_texels = (float)map->blur + 1.5f,
             .margin_pixels = 3,
-            .one_window = true},
+            .one_window = true,
+            .bound = BOUND_KERNEL},
         tiles, error);
 }

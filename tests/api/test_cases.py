@@ -1,5 +1,8 @@
 """Files that showed a fault, each with what must be seen, from a folder beside the checkout; and real
-files, whose bounds were computed from the glTF specification alone. Skipped where the folder is not."""
+files, whose bounds were computed from the glTF specification alone. Skipped where the folder is not.
+
+    test_cases.py [--without=CASE,CASE]    leaves out cases that are known to fail, and says so
+"""
 import json
 import os
 import sys
@@ -14,6 +17,11 @@ SHARED = os.environ.get("PENUMBRA_SHARED") or os.path.join(
 KINDS = {".glb": "model/gltf-binary", ".gltf": "model/gltf+json", ".zip": "application/zip"}
 DEFAULT = {"width": 160, "height": 120}
 BACKGROUND = (128, 128, 128)  # of the layer "normal"
+# What a case may expect. How long a picture takes is a benchmark's matter, and said to be skipped.
+EXPECTATIONS = frozenset("""status triangles warnings bounds tolerance same_picture_as request
+    pixels_off_by_more_than_8 texture fraction_of_pixels_above_12 mean_of_the_lit_object methods visible
+    detail_lists status_with_entry umbra_missing mean_of_picture mean_luminance_of_the_object
+    pixels_above_60_inside_the_shadow time_ratio""".split())
 
 
 def manifest(*folder):
@@ -106,7 +114,10 @@ class Cases(unittest.TestCase):
 
     def check_visibility(self, scene, expect):
         request = expect["request"]
-        methods = expect["methods"] if isinstance(expect["methods"], list) else self.methods
+        listed = expect["methods"] if isinstance(expect["methods"], list) else self.methods
+        methods = [m for m in listed if m in self.methods]
+        if methods != listed:
+            print("\n  not among the methods: " + ", ".join(set(listed) - set(methods)))
         truth = self.picture(scene, request, technique={"name": "raytraced"})
         # What a published method cannot do it says; the baseline draws no shadow by definition.
         for method in methods:
@@ -148,6 +159,7 @@ class Cases(unittest.TestCase):
 
     def check_case(self, case):
         expect = case["expect"]
+        self.assertLessEqual(set(expect), EXPECTATIONS)
         scene = self.check_answer(("cases",), case["file"], expect)
         if "same_picture_as" in expect:
             other = self.check_answer(("cases",), expect["same_picture_as"], {})
@@ -158,6 +170,8 @@ class Cases(unittest.TestCase):
         elif scene and any(key in expect for key in (
                 "texture", "visible", "mean_of_the_lit_object", "mean_luminance_of_the_object")):
             self.check_default_picture(scene, expect)
+        if "time_ratio" in expect:
+            self.skipTest("drawn; its time is not measured here")
 
     def check_real(self, file):
         answer = self.post(("scenes", "real"), file["file"])
@@ -174,13 +188,19 @@ def add(prefix, entry, check):
     setattr(Cases, name, lambda self: check(self, entry))
 
 
+left_out = [name for flag in sys.argv[1:] if flag.startswith("--without=")
+            for name in flag.split("=")[1].split(",")]
+sys.argv = [flag for flag in sys.argv if not flag.startswith("--without=")]
 for one in manifest("cases"):
-    add("case", one, Cases.check_case)
+    if os.path.splitext(one["file"])[0] not in left_out:
+        add("case", one, Cases.check_case)
 for one in manifest("scenes", "real"):
     add("real", one, Cases.check_real)
 
 if __name__ == "__main__":
     if not manifest("cases"):
-        print("skipped: there is no folder shared")
+        print("skipped: there is no folder shared beside the checkout, nor at PENUMBRA_SHARED")
         sys.exit(77)
+    if left_out:
+        print("left out, known to fail: " + ", ".join(left_out))
     harness.main()

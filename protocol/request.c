@@ -16,6 +16,7 @@ const char *const pen_tone_map_names[] = {
 #include "protocol/tone_maps.def"
 #undef PEN_TONE_MAP
     NULL};
+const char *const pen_edges_names[] = {"smooth", "none", NULL};
 const char *const pen_casters_names[] = {"both", "front", NULL};
 const char *const pen_priority_names[] = {"interactive", "batch", NULL};
 const char *const pen_pattern_names[] = {

@@ -57,6 +57,7 @@ enum pen_tone_map {
 #undef PEN_TONE_MAP
     PEN_TONE_MAPS
 };
+enum pen_edges { PEN_EDGES_SMOOTH, PEN_EDGES_NONE };
 enum pen_casters { PEN_CASTERS_BOTH, PEN_CASTERS_FRONT };
 enum pen_weighting { PEN_WEIGHT_AREA, PEN_WEIGHT_G };
 enum pen_priority { PEN_PRIORITY_INTERACTIVE, PEN_PRIORITY_BATCH };
@@ -96,6 +97,7 @@ extern const char *const pen_light_type_names[];
 extern const char *const pen_format_names[];
 extern const char *const pen_format_mime[];
 extern const char *const pen_tone_map_names[];
+extern const char *const pen_edges_names[];
 extern const char *const pen_casters_names[];
 extern const char *const pen_priority_names[];
 extern const char *const pen_pattern_names[]; /* built-in emission patterns */

@@ -1,4 +1,5 @@
 #include "renderer/frame/frame.h"
+#include "renderer/frame/edges.h"
 #include "renderer/frame/layers.h"
 #include "renderer/frame/needs.h"
 #include "renderer/frame/output.h"
@@ -39,6 +40,8 @@ static void fit_targets(struct frame *f)
     const struct pen_request *r = f->job->request;
     frame_output_fit(t, r);
     gl_target_fit(&t->vis, GL_RGBA16F, r->width, r->height, f->light_count ? f->light_count : 1, 1);
+    if (frame_output_is_direct(r) && frame_edges_are_smooth(f->job))
+        gl_target_fit(&t->stairs, GL_RGBA8, r->width, r->height, 0, 1);
     if (!frame_output_is_direct(r) && frame_needs(r, PEN_SOURCE_BEAUTY))
         frame_fit_sum(&t->beauty, GL_RGBA32F, r);
     if (frame_needs(r, PEN_SOURCE_VISIBILITY))
@@ -239,6 +242,9 @@ static bool shade(struct frame *f, struct pen_error *error)
     const struct frame_targets *t = job->targets;
     bool direct = frame_output_is_direct(job->request),
          emission = t->gbuffer.emission.texture.name != 0;
+    const struct gl_target *target = !direct                       ? &t->beauty
+                                     : frame_edges_are_smooth(job) ? &t->stairs
+                                                                   : &t->color;
     struct shade_block block;
     make_shade_block(f, &block);
     struct pass_texture textures[] = {
@@ -271,7 +277,7 @@ static bool shade(struct frame *f, struct pen_error *error)
             .stage = PEN_STAGE_SHADE,
             .textures = textures,
             .texture_count = emission ? 7 : 6,
-            .framebuffer = direct ? t->color.framebuffer : t->beauty.framebuffer,
+            .framebuffer = target->framebuffer,
             .width = job->request->width,
             .height = job->request->height,
             .add = !direct,

@@ -1,4 +1,5 @@
 #include "renderer/frame/output.h"
+#include "renderer/frame/edges.h"
 #include "protocol/memory.h"
 #include "renderer/frame/layers.h"
 #include "renderer/passes/draw/screen.h"
@@ -20,6 +21,7 @@ static enum pen_pixel pixel_of(const struct pen_output *output, uint32_t layer)
 bool frame_output_is_direct(const struct pen_request *r)
 {
     return r->output.layer == PEN_LAYER_BEAUTY && r->antialias == 1 &&
+           !pen_request_is_transparent(r) && /* alpha is rounded once */
            pixel_of(&r->output, PEN_LAYER_BEAUTY) == PEN_PIXEL_RGBA8;
 }
 
@@ -149,9 +151,13 @@ bool frame_output_read(const struct frame_job *job, const struct view *view,
         if (r->output.layer == PEN_LAYER_ALL ? !has : r->output.layer != layer)
             continue;
         enum pen_pixel pixel = pixel_of(&r->output, layer);
-        if (!frame_output_is_direct(r))
+        bool direct = frame_output_is_direct(r);
+        bool smooth = pen_layers[layer].source == PEN_SOURCE_BEAUTY && frame_edges_are_smooth(job);
+        if (!direct)
             fit_color(job->targets, r, pixel);
-        if (!frame_output_is_direct(r) && !convert(job, &block, layer, raw, error)) {
+        if (smooth    ? !frame_edges_blend(job, view, direct, raw, error)
+            : !direct ? !convert(job, &block, layer, raw, error)
+                      : false) {
             pen_frame_finish(frame);
             return false;
         }

@@ -4,8 +4,10 @@
 
 struct frame_targets {
     struct gbuffer gbuffer;
-    struct gl_target vis;   /* RGBA16F array, a layer per light; aimed at the light at work */
-    struct gl_target color; /* what is read back */
+    struct gl_target vis;    /* RGBA16F array, a layer per light; aimed at the light at work */
+    struct gl_target color;  /* what is read back */
+    struct gl_target stairs; /* the same before its edges are smooth */
+    struct gl_target places; /* D32F, EDGE_PLACES samples, of some rows of the picture */
     /* Sums over lights and jittered frames: */
     struct gl_target beauty, visibility; /* RGBA32F */
     struct gl_target classes;            /* RG16F: times proved lit, in umbra */

@@ -35,6 +35,7 @@
     F(FINISH, Finish) F(FLUSH, Flush) F(FRONTFACE, FrontFace) \
     F(GENERATETEXTUREMIPMAP, GenerateTextureMipmap) F(GETERROR, GetError) \
     F(GETGRAPHICSRESETSTATUS, GetGraphicsResetStatus) F(GETINTEGERV, GetIntegerv) \
+    F(GETMULTISAMPLEFV, GetMultisamplefv) \
     F(GETINTEGER64V, GetInteger64v) \
     F(GETNAMEDBUFFERSUBDATA, GetNamedBufferSubData) F(GETPROGRAMINFOLOG, GetProgramInfoLog) \
     F(GETPROGRAMIV, GetProgramiv) F(GETPROGRAMRESOURCEINDEX, GetProgramResourceIndex) \
@@ -64,6 +65,7 @@
     F(SCISSOR, Scissor) F(SHADERSOURCE, ShaderSource) F(STENCILFUNC, StencilFunc) \
     F(STENCILOP, StencilOp) F(TEXTUREPARAMETERI, TextureParameteri) \
     F(TEXTURESTORAGE2D, TextureStorage2D) F(TEXTURESTORAGE3D, TextureStorage3D) \
+    F(TEXTURESTORAGE2DMULTISAMPLE, TextureStorage2DMultisample) \
     F(TEXTURESUBIMAGE2D, TextureSubImage2D) F(TEXTURESUBIMAGE3D, TextureSubImage3D) \
     F(TEXTUREVIEW, TextureView) \
     F(UNMAPNAMEDBUFFER, UnmapNamedBuffer) F(USEPROGRAM, UseProgram) \

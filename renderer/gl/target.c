@@ -8,6 +8,14 @@ static GLenum attachment_of(const struct gl_texture *texture)
     return texture->format == GL_DEPTH_COMPONENT32F ? GL_DEPTH_ATTACHMENT : GL_COLOR_ATTACHMENT0;
 }
 
+static void attach(struct gl_target *target)
+{
+    const struct gl_texture *t = &target->texture;
+    bool depth = attachment_of(t) == GL_DEPTH_ATTACHMENT;
+    all_bytes += t->bytes;
+    target->framebuffer = gl_framebuffer_create(&t, depth ? 0 : 1, depth ? t : NULL);
+}
+
 bool gl_target_fit(struct gl_target *target, GLenum format, uint32_t width, uint32_t height,
     uint32_t layers, uint32_t levels)
 {
@@ -17,11 +25,21 @@ bool gl_target_fit(struct gl_target *target, GLenum format, uint32_t width, uint
         return false;
     gl_target_destroy(target);
     target->texture = gl_texture_create(format, width, height, layers, levels);
-    all_bytes += t->bytes;
-    bool depth = attachment_of(t) == GL_DEPTH_ATTACHMENT;
-    target->framebuffer = gl_framebuffer_create(&t, depth ? 0 : 1, depth ? t : NULL);
+    attach(target);
     if (layers)
         gl_target_aim(target, 0, 0);
+    return true;
+}
+
+bool gl_target_fit_samples(
+    struct gl_target *target, GLenum format, uint32_t width, uint32_t height, uint32_t samples)
+{
+    const struct gl_texture *t = &target->texture;
+    if (t->name && t->format == format && t->width == width && t->height == height)
+        return false;
+    gl_target_destroy(target);
+    target->texture = gl_texture_create_samples(format, width, height, samples);
+    attach(target);
     return true;
 }
 

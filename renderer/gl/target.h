@@ -12,6 +12,9 @@ struct gl_target {
  * start. True when it was made anew. */
 bool gl_target_fit(struct gl_target *target, GLenum format, uint32_t width, uint32_t height,
     uint32_t layers, uint32_t levels);
+/* The same of so many samples per texel. */
+bool gl_target_fit_samples(
+    struct gl_target *target, GLenum format, uint32_t width, uint32_t height, uint32_t samples);
 void gl_target_destroy(struct gl_target *target); /* zeroed or NULL: nothing happens */
 
 /* Aims the framebuffer at one level, and of an array at one layer, until the next call. */

@@ -56,6 +56,21 @@ struct gl_texture gl_texture_create(
     return t;
 }
 
+struct gl_texture gl_texture_create_samples(
+    GLenum format, uint32_t width, uint32_t height, uint32_t samples)
+{
+    struct gl_texture t = {.target = GL_TEXTURE_2D_MULTISAMPLE,
+        .format = format,
+        .width = width,
+        .height = height,
+        .levels = 1,
+        .bytes = (uint64_t)width * height * samples * texel_bytes(format)};
+    gl.CreateTextures(t.target, 1, &t.name);
+    gl.TextureStorage2DMultisample(
+        t.name, (GLsizei)samples, format, (GLsizei)width, (GLsizei)height, GL_TRUE);
+    return t;
+}
+
 void gl_texture_destroy(struct gl_texture *texture)
 {
     if (!texture)

@@ -14,6 +14,9 @@ struct gl_texture {
  * state of the texture itself: nearest, clamped; use gl_sampler for anything else. */
 struct gl_texture gl_texture_create(
     GLenum format, uint32_t width, uint32_t height, uint32_t layers, uint32_t levels);
+/* GL_TEXTURE_2D_MULTISAMPLE of so many samples per texel, always at the same places. */
+struct gl_texture gl_texture_create_samples(
+    GLenum format, uint32_t width, uint32_t height, uint32_t samples);
 void gl_texture_destroy(struct gl_texture *texture);
 
 /* A framebuffer with level 0 of these as its attachments, for what gl_target does not fit: several

@@ -80,6 +80,7 @@ static void upload_materials(struct scene *s)
         bool gloss =
             m->flags & PSC_SPECULAR_GLOSSINESS ? m->glossiness > 0.5f : m->roughness < 0.5f;
         s->has_gloss |= gloss || m->surface.texture >= 0;
+        s->has_blend |= m->alpha_mode == PSC_BLEND;
         s->has_unlit |= (m->flags & PSC_UNLIT) != 0;
     }
     put_buffer(s, &s->materials, records, n * sizeof *records);

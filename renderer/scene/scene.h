@@ -56,6 +56,7 @@ struct scene {
     int32_t moving_animation;        /* that moving_stage is of; -1: none yet */
     const struct scene_stage *stage; /* one of the two */
     bool has_emission, has_unlit;
+    bool has_blend;
     bool has_gloss; /* some roughness is below 0.5 */
     uint64_t bytes;
     uint64_t last_use;

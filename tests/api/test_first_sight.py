@@ -169,7 +169,7 @@ class FirstSight(unittest.TestCase):
     def test_what_shines_by_itself(self):
         scene = self.d.upload(mesh_scene(*box(), color=(0, 0, 0, 1),
                                          material={"emissiveFactor": [0.25, 0.25, 0.25]}))
-        request = {"sky": False, "lights": [], "exposure_ev": 0, "ground": False}
+        request = {"sky": False, "lights": [], "exposure_ev": 0, "ground": False, "edges": "none"}
         shown = {p for p in self.picture(scene, **request)}
         self.assertEqual(shown, {(0, 0, 0), (137, 137, 137)})  # sRGB of 0.25
 

@@ -65,23 +65,54 @@ class Thumbnail(unittest.TestCase):
                     self.same(self.over(clear, background), opaque)
 
     def test_coverage_is_what_surfaces_cover(self):
-        alpha = [p[3] for p in self.picture(background="transparent", ground=False)]
+        alpha = [p[3] for p in self.picture(background="transparent", ground=False, edges="none")]
         depth = self.picture(ground=False, output={"layer": "depth"})
         self.assertEqual([a == 1 for a in alpha], [d[0] < 1 for d in depth])
         fractions = {p[3] for p in self.picture(background="transparent", ground=False, antialias=4)}
         self.assertEqual({round(4 * a) / 4 for a in fractions}, {0, 0.25, 0.5, 0.75, 1})
         self.assertLess(max(abs(a - round(4 * a) / 4) for a in fractions), 0.51 / 255)
 
+    def test_smooth_edges(self):
+        """Alpha at the default is the covered share, colours those of the surface alone."""
+        for more in ({"ground": False}, {"ground": "shadow"}):
+            truth = self.picture(background="transparent", antialias=64, **more)
+            stairs = self.picture(background="transparent", edges="none", **more)
+            smooth = self.picture(background="transparent", **more)
+            edge = [i for i, p in enumerate(truth) if more["ground"] is False and 0 < p[3] < 1]
+
+            def error(picture, pixels):
+                return (sum((picture[i][3] - truth[i][3]) ** 2 for i in pixels) / len(pixels)) ** 0.5
+            if edge:
+                self.assertGreater(len(edge), 50)
+                self.assertLess(error(smooth, edge), 0.4 * error(stairs, edge))
+            everywhere = range(len(truth))
+            self.assertLess(error(smooth, everywhere), 0.6 * error(stairs, everywhere))
+            for p in smooth:
+                if p[3] > 0.1 and more["ground"] is False:
+                    self.assertGreater(p[0], p[2])  # the box is brown, whatever is behind it
+
+    def test_smooth_edges_leave_other_layers_alone(self):
+        for layer in ("depth", "normal", "albedo", "visibility"):
+            output = {"layer": layer}
+            self.assertEqual(self.picture(output=output), self.picture(output=output, edges="none"))
+
+    def test_smooth_edges_of_any_size(self):
+        for width, height in ((1, 1), (1, 7), (3, 2), (97, 5)):
+            for bits in (8, 16):
+                self.assertEqual(
+                    len(self.picture(bits, width=width, height=height)), width * height)
+
     def test_shadow_catcher(self):
         """Alpha is one minus what the shadow leaves of a white ground's light."""
         for lights in (SUN, [{"type": "rect", "position": [-2, 3, 0.5], "target": [0, 0, 0],
                               "power_w": 60, "texture": {"pattern": "checker"}}]):
             base = {"sky": False, "ambient": [0.2, 0.2, 0.2], "lights": lights, "bits": 16,
+                    "edges": "none",
                     "technique": "multisample" if lights is not SUN else "hard"}
             white = {**base, "ground_albedo": [1, 1, 1], "exposure_ev": -2}
             caught = self.picture(**base, ground="shadow", background="transparent")
             shadow, clear = self.picture(**white), self.picture(**{**white, "technique": "none"})
-            box = self.picture(background="transparent", ground=False)
+            box = self.picture(background="transparent", ground=False, edges="none")
             compared = dark = 0
             for got, with_shadow, without, solid in zip(caught, shadow, clear, box):
                 if solid[3] == 1:

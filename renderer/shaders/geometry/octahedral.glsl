@@ -8,11 +8,17 @@ vec2 octahedral_encode(vec3 n)
     return (n.z >= 0.0 ? n.xy : folded) * 0.5 + 0.5;
 }
 
-vec3 octahedral_decode(vec2 e)
+// Of any length.
+vec3 octahedral_direction(vec2 e)
 {
     e = 2.0 * e - 1.0;
     vec3 n = vec3(e, 1.0 - abs(e.x) - abs(e.y));
     float t = max(-n.z, 0.0);
     n.xy += vec2(n.x >= 0.0 ? -t : t, n.y >= 0.0 ? -t : t);
-    return normalize(n);
+    return n;
+}
+
+vec3 octahedral_decode(vec2 e)
+{
+    return normalize(octahedral_direction(e));
 }

@@ -1,0 +1,11 @@
+/* Smooth edges at the price of a depth pass: of a picture with one shaded sample per pixel. */
+#pragma once
+#include "renderer/frame/job.h"
+
+/* Of the beauty layer; all others say what is at the centre of a pixel. Not of scenes with blended
+ * surfaces: a pixel that shows none of them says nothing of its neighbours. */
+bool frame_edges_are_smooth(const struct frame_job *job);
+/* What the file holds of the beauty layer, into targets->color. `resolved`:
+ * targets->stairs is the picture, else the sum in targets->beauty; `raw`: the file is of radiance. */
+bool frame_edges_blend(const struct frame_job *job, const struct view *view, bool resolved,
+    bool raw, struct pen_error *error);

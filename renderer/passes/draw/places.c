@@ -1,0 +1,83 @@
+#include "renderer/passes/draw/places.h"
+#include "renderer/passes/draw/turn.h"
+
+#define FIRST_PIXELS (1u << 18)
+
+static GLuint program(struct technique_ctx *ctx, const char *defines, struct pen_error *error)
+{
+    struct gl_program_desc desc = {
+        .vertex = "geometry.vert", .fragment = "places.frag", .defines = defines};
+    return gl_programs_get(ctx->programs, &desc, error);
+}
+
+static void find_places(const struct gl_target *depths, struct edges_block *where)
+{
+    gl.BindFramebuffer(GL_FRAMEBUFFER, depths->framebuffer);
+    for (GLuint i = 0; i < EDGE_PLACES; i++) {
+        float at[2];
+        gl.GetMultisamplefv(GL_SAMPLE_POSITION, i, at);
+        where->across[i] = at[0] - 0.5f;
+        where->down[i] = at[1] - 0.5f;
+    }
+}
+
+static void draw_band(struct technique_ctx *ctx, struct scene *scene, const struct view *view,
+    const struct scene_pass *pass, GLuint ground, uint32_t first, const struct pass_bands *bands,
+    const struct gl_target *depths, GLuint block)
+{
+    GLuint programs[] = {pass->opaque, pass->textured, ground};
+    struct cull_view cull;
+    view_to_cull(view, &cull);
+    if (bands->height == view->height)
+        pass_bands_crop(bands, 1, cull.world_to_clip);
+    for (int i = 0; i < 3; i++)
+        if (programs[i])
+            gl.ProgramUniformMatrix4fv(
+                programs[i], LOCATION_TO_CLIP, 1, GL_FALSE, (const float *)view->world_to_clip);
+    gl.BindFramebuffer(GL_FRAMEBUFFER, depths->framebuffer);
+    gl.BindBufferBase(GL_UNIFORM_BUFFER, UBO_EXTRA, block);
+    gl.Viewport(0, -(GLint)first, (GLsizei)view->width, (GLsizei)view->height);
+    gl.ClipControl(GL_UPPER_LEFT, GL_ZERO_TO_ONE);
+    gl.DepthMask(GL_TRUE);
+    gl.Enable(GL_DEPTH_TEST);
+    gl.DepthFunc(GL_GREATER);
+    pass_bands_aim(bands);
+    scene_draw(scene, &cull, pass);
+    if (ground) {
+        gl.UseProgram(ground);
+        gl.BindVertexArray(ctx->empty_array);
+        gl.DrawArrays(GL_TRIANGLE_STRIP, 0, 4);
+    }
+    gl.Disable(GL_DEPTH_TEST);
+}
+
+bool pass_places(struct technique_ctx *ctx, struct scene *scene, const struct view *view,
+    bool ground, uint32_t first, uint32_t rows, struct gl_target *depths, struct edges_block *where,
+    struct pen_error *error)
+{
+    static const float zero[4] = {0};
+    struct scene_pass pass = {
+        .opaque = program(ctx, NULL, error), .textured = program(ctx, "#define ALPHA\n", error)};
+    GLuint flat = program(ctx, "#define FULL\n#define GROUND\n", error), block;
+    if (!pass.opaque || !pass.textured || !flat)
+        return false;
+    gl_timer_begin(&ctx->timer, PEN_STAGE_GBUFFER, "edge places");
+    gl_target_fit_samples(depths, GL_DEPTH_COMPONENT32F, view->width, rows, EDGE_PLACES);
+    find_places(depths, where);
+    where->rows[0] = (int32_t)first;
+    where->rows[1] = (int32_t)rows;
+    gl.CreateBuffers(1, &block);
+    gl.NamedBufferStorage(block, sizeof *where, where, 0);
+    gl.DepthMask(GL_TRUE);
+    gl.ClearNamedFramebufferfv(depths->framebuffer, GL_DEPTH, 0, zero);
+    struct pass_bands bands;
+    bool more = true, ok = true;
+    pass_bands_begin(ctx, &bands, view->width, rows, FIRST_PIXELS);
+    while (ok && more) {
+        draw_band(ctx, scene, view, &pass, ground ? flat : 0, first, &bands, depths, block);
+        ok = pass_bands_next(ctx, &bands, &more, error);
+    }
+    gl.DeleteBuffers(1, &block);
+    gl_timer_end(&ctx->timer);
+    return ok && pass_turn(ctx, error);
+}

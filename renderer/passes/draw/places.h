@@ -1,0 +1,12 @@
+/* Depths at several places in every pixel, of which shading knows one. */
+#pragma once
+#include "renderer/technique.h"
+
+#define SHARED_ROWS "renderer/shaders/frame/edges.def"
+#include "renderer/shared/rows_c.h"
+
+/* What the view sees at EDGE_PLACES places of the pixels in `rows` rows from `first`, into a target
+ * of so many samples. `where`: the places. */
+bool pass_places(struct technique_ctx *ctx, struct scene *scene, const struct view *view,
+    bool ground, uint32_t first, uint32_t rows, struct gl_target *depths, struct edges_block *where,
+    struct pen_error *error);

@@ -1,0 +1,115 @@
+// Smooth edges out of one shaded sample per pixel. Of several places in every pixel the depth is
+// known; each takes its light from those of the 3 x 3 pixels around whose planes pass through it.
+// RESOLVED: the picture holds display values, else sums; RAW: a file of radiance is wanted. Else it
+// is light as the display gives it off that is averaged: what is too bright for it has no stairs.
+#include "view.glsl"
+#include "octahedral.glsl"
+#include "display.glsl"
+#include "edges.def"
+
+layout(binding = UNIT_DEPTH) uniform sampler2D g_depth;
+layout(binding = UNIT_NORMAL) uniform sampler2D g_normal;
+layout(binding = UNIT_PLACES) uniform sampler2DMS place_depths; // of some rows
+layout(binding = UNIT_SOURCE) uniform sampler2D picture;
+
+layout(location = 0) out vec4 color;
+
+// What the file holds of a pixel, without its neighbours.
+vec4 alone(vec4 c)
+{
+#ifdef RAW
+    return vec4(c.rgb * view.display.x, c.a);
+#elif defined(RESOLVED)
+    return c;
+#else
+    return c.a > 0.0 ? vec4(display_encode(c.rgb / c.a), c.a) : vec4(0.0);
+#endif
+}
+
+// Its light, times alpha.
+vec4 light_of(vec4 c)
+{
+    c = alone(c);
+#ifdef RAW
+    return c;
+#else
+    return vec4(srgb_decode(c.rgb) * c.a, c.a);
+#endif
+}
+
+float depth_at(ivec2 pixel)
+{
+    return texelFetch(g_depth, pixel, 0).r;
+}
+
+// Reversed depth is linear in the picture along a plane: its value at the pixel's centre, and its
+// gradient per pixel. The normal's length cancels out.
+vec3 plane_at(ivec2 pixel, vec3 right, vec3 up)
+{
+    float depth = depth_at(pixel);
+    vec3 n = octahedral_direction(texelFetch(g_normal, pixel, 0).xy);
+    vec2 centred = vec2(pixel) + 0.5 - 0.5 * view.viewport.xy;
+    vec2 slope = vec2(dot(n, right), -dot(n, up)) / view.eye.w;
+    return vec3(
+        depth, slope * (depth / min(dot(n, view.forward.xyz) + dot(slope, centred), -1e-4)));
+}
+
+// How well the plane of the pixel at `offset` explains the depths: 10 where it passes through them,
+// falling with the distance over what the plane rises per pixel.
+vec4 match(vec3 plane, vec4 depths, vec2 offset)
+{
+    vec4 miss = plane.x - dot(plane.yz, offset) - depths;
+    miss = abs(miss + plane.y * edge.across + plane.z * edge.down);
+    vec4 rise = abs(plane.y) + abs(plane.z) + 1e-3 * max(depths, plane.x) + 1e-20;
+    vec4 background = mix(vec4(1e-9), vec4(10.0), equal(depths, vec4(0.0)));
+    return plane.x == 0.0 ? background : rise / (miss + 0.1 * rise);
+}
+
+void main()
+{
+    ivec2 pixel = ivec2(gl_FragCoord.xy), last = ivec2(view.viewport.xy) - 1;
+    if (pixel.y < edge.rows.x || pixel.y >= edge.rows.x + edge.rows.y)
+        discard;
+    color = alone(texelFetch(picture, pixel, 0));
+    // Along a plane a depth is the mean of those on either side. Cheaper than to read all places.
+    ivec2 before = max(pixel - 1, ivec2(0)), after = min(pixel + 1, last);
+    vec2 low = vec2(depth_at(ivec2(before.x, pixel.y)), depth_at(ivec2(pixel.x, before.y)));
+    vec2 high = vec2(depth_at(ivec2(after.x, pixel.y)), depth_at(ivec2(pixel.x, after.y)));
+    float depth = depth_at(pixel);
+    vec2 bend = abs(low + high - 2.0 * depth), rise = abs(low - high) + 1e-4 * depth;
+    // Loops, since software rasterisers leave them out where no pixel needs them.
+    int around = max(bend.x, bend.y) > 0.1 * (rise.x + rise.y) ? 9 : 0;
+    vec3 right = vec3(0.0), up = vec3(0.0);
+    vec4 depths = vec4(0.0), open = vec4(0.0);
+    for (int once = 0; once < around; once += 9) {
+        right = normalize(cross(view.forward.xyz,
+            vec3(view.world_to_clip[0].y, view.world_to_clip[1].y, view.world_to_clip[2].y)));
+        up = cross(right, view.forward.xyz);
+        for (int i = 0; i < EDGE_PLACES; i++)
+            depths[i] = texelFetch(place_depths, pixel - ivec2(0, edge.rows.x), i).r;
+        // 0 where the pixel's own plane explains the place.
+        open = clamp(4.0 - 0.6 * match(plane_at(pixel, right, up), depths, vec2(0.0)), 0.0, 1.0);
+        around = any(greaterThan(open, vec4(0.0))) ? 9 : 0;
+    }
+    vec4 sums[EDGE_PLACES], weights = vec4(0.0);
+    for (int i = 0; i < EDGE_PLACES; i++)
+        sums[i] = vec4(0.0);
+    for (int k = 0; k < around; k++) {
+        ivec2 at = clamp(pixel + ivec2(k % 3, k / 3) - 1, ivec2(0), last);
+        vec4 weight = match(plane_at(at, right, up), depths, vec2(at - pixel));
+        weight *= k == 4 ? vec4(1.0) : open;
+        weights += weight;
+        vec4 light = light_of(texelFetch(picture, at, 0));
+        for (int i = 0; i < EDGE_PLACES; i++)
+            sums[i] += weight[i] * light;
+    }
+    for (int once = 0; once < around; once += 9) {
+        vec4 light = vec4(0.0);
+        for (int i = 0; i < EDGE_PLACES; i++)
+            light += sums[i] / (weights[i] * float(EDGE_PLACES));
+        color = light;
+#ifndef RAW
+        color.rgb = light.a > 0.0 ? srgb_encode(light.rgb / light.a) : vec3(0.0);
+#endif
+    }
+}

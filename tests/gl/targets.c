@@ -55,6 +55,7 @@ static void check_frame(void)
     fixture_scene(r, PEN_GENERATED_SQUARE, 0, 1, id);
     fixture_request(&request, id, "hard");
     request.sky.on = 0;
+    request.edges = PEN_EDGES_NONE;
     fixture_render(r, &request, &result);
     CHECK(gl_targets_bytes() == pixel * 200 * 150);
     request.width = 320;

@@ -100,13 +100,21 @@ static uint32_t in_turns(struct pen_renderer *r, const struct pen_request *const
     return turns;
 }
 
-static void few_samples(struct pen_request *request, double count)
+static void set_number(struct pen_request *request, const char *name, double value)
 {
     const struct pen_technique_info *info =
         pen_catalogue_find(pen_renderer_catalogue(), request->technique);
-    const struct pen_param *row = pen_param_find(info->params, "samples");
-    if (row && row->min <= count && row->max >= count)
-        pen_param_store(row, request->technique_params, &count, "", NULL);
+    const struct pen_param *row = pen_param_find(info->params, name);
+    if (row && row->min <= value && row->max >= value)
+        pen_param_store(row, request->technique_params, &value, "", NULL);
+}
+
+/* The same passes for less work. */
+static void make_cheap(struct pen_request *request, double samples)
+{
+    set_number(request, "samples", samples);
+    set_number(request, "map_size", 256);
+    set_number(request, "series_size", 256);
 }
 
 /* Every method beside every neighbour in the list, with other sizes, cameras and lights. */
@@ -127,8 +135,8 @@ static void check_methods(struct pen_renderer *r, const uint8_t scenes[2][PEN_ID
             b.lights[k].position[0] = 2 * k, b.lights[k].position[1] = 4;
             b.lights[k].position[2] = 1;
         }
-        few_samples(&a, 20);
-        few_samples(&b, 20);
+        make_cheap(&a, 20);
+        make_cheap(&b, 20);
         uint64_t expected[2] = {whole(r, &a), whole(r, &b)}, got[2];
         CHECK(expected[0] && expected[1]);
         const struct pen_request *requests[2] = {&a, &b};
@@ -147,7 +155,7 @@ static void check_giving_up(struct pen_renderer *r, const uint8_t scene[PEN_ID_B
     for (uint32_t i = 0; i < catalogue->count; i++) {
         struct pen_request request;
         fixture_request(&request, scene, catalogue->items[i]->name);
-        few_samples(&request, 40);
+        make_cheap(&request, 40);
         request.width = 96, request.height = 72;
         uint64_t expected = whole(r, &request), bytes = gl_targets_bytes();
         for (uint32_t most = 0; most < 60; most = 2 * most + 1) {

@@ -162,19 +162,19 @@ class Framing(unittest.TestCase):
         """A queued render whose client has gone is not started."""
         scene = self.d.upload(grid_scene(1, "left behind"))
         gone = self.d.metric("penumbra_renders_abandoned_total")
-        blocker = threading.Thread(target=self.d.render, args=(scene, harness.HEAVY))
-        second = threading.Thread(target=self.d.render,
-                                  args=(scene, {**harness.HEAVY, "exposure_ev": 1}))
-        blocker.start()
-        second.start()
-        harness.wait(lambda: self.d.metric("penumbra_renders_running") >= 2)
-        body = json.dumps({**SMALL, "exposure_ev": 2}).encode()
-        with socket.create_connection(("127.0.0.1", self.d.port)) as s:
-            s.sendall(b"POST /v1/scenes/%s/render HTTP/1.1\r\n" % scene.encode() + HOST +
-                      b"Content-Length: %d\r\n\r\n" % len(body) + body)
-            harness.wait(lambda: self.d.metric("penumbra_queue_depth") >= 1)
-        blocker.join()
-        second.join()
+        blockers = [threading.Thread(target=self.d.render, args=(scene, {**SMALL, "exposure_ev": n}))
+                    for n in range(harness.IN_TURNS)]
+        body = json.dumps({**SMALL, "exposure_ev": 9}).encode()
+        with self.d.paused():
+            for blocker in blockers:
+                blocker.start()
+            harness.wait(lambda: self.d.metric("penumbra_renders_running") == harness.IN_TURNS)
+            with socket.create_connection(("127.0.0.1", self.d.port)) as s:
+                s.sendall(b"POST /v1/scenes/%s/render HTTP/1.1\r\n" % scene.encode() + HOST +
+                          b"Content-Length: %d\r\n\r\n" % len(body) + body)
+                harness.wait(lambda: self.d.metric("penumbra_queue_depth") >= 1)
+        for blocker in blockers:
+            blocker.join()
         harness.wait(lambda: self.d.metric("penumbra_renders_abandoned_total") == gone + 1)
 
     def test_connection_limits(self):

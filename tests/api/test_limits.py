@@ -12,10 +12,7 @@ import unittest
 import urllib.request
 
 import harness
-from harness import HEAVY, PATIENCE, SMALL, Daemon, grid_scene, wait
-
-
-IN_TURNS = 4  # renders that a worker takes at a time
+from harness import HEAVY, IN_TURNS, PATIENCE, SMALL, Daemon, grid_scene, wait
 
 
 class Crowd:

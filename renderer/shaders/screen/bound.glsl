@@ -61,11 +61,9 @@ float past_caster(Surface s, Contact c, Caster caster)
     n.xy = caster.slope / texel * (light_parallel ? range : range / light.far_z);
     n.z = light_parallel ? -1.0 : -(1.0 + dot(n.xy, p.xy)) / p.z;
     n = normalize(n);
-    // A smooth surface curves away from its own texels' planes; one that meets another at an angle
-    // does not.
-    float nearly = smoothstep(0.8, 1.0, dot(n, s.n));
-    float least = c.rounding + 0.02 * length(c.plane.gradient) + 0.5 * caster.steeper;
-    if (c.plane.depth - caster.depth < mix(-c.rounding, least, nearly))
+    // A smooth surface curves away from its own texels' planes, and its triangles meet at such
+    // angles; what stands on another meets it at a steeper one.
+    if (dot(n, s.n) > 0.5 || c.plane.depth - caster.depth < -c.rounding)
         return 1.0;
     float left = 1.0 - horizon_share(p, n);
     return left < 1e-3 ? 0.0 : clamp(left / max(horizon_share(s.p, s.n), 1e-3), 0.0, 1.0);

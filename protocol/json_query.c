@@ -29,8 +29,18 @@ static bool starts_with(const char *text, const char *prefix)
     return !strncmp(text, prefix, strlen(prefix));
 }
 
+/* A bare name that a field of the request has too is the method's when the value is one of the words
+ * that the method's parameter knows. */
+static bool is_word_of_method(
+    const struct pen_technique_info *info, const char *key, const char *value)
+{
+    const struct pen_param *row = info ? pen_param_find(info->params, key) : NULL;
+    return row && row->choices && value && pen_choice_index(row->choices, value) >= 0;
+}
+
 /* Writes the path in the JSON body that `key` is short for. */
-static void expand(const char *key, const struct pen_technique_info *info, char path[MAX_PATH])
+static void expand(
+    const char *key, const char *value, const struct pen_technique_info *info, char path[MAX_PATH])
 {
     const char *prefix = "";
     if (!strcmp(key, "technique"))
@@ -40,6 +50,8 @@ static void expand(const char *key, const struct pen_technique_info *info, char 
     else if (starts_with(key, "light.")) {
         prefix = "lights.0.";
         key += strlen("light.");
+    } else if (is_word_of_method(info, key, value)) {
+        prefix = "technique.params.";
     } else if (!pen_param_find(pen_request_table(), key) &&
                !pen_param_find(pen_delivery_table(), key)) {
         if (pen_param_find(pen_output_table(), key))
@@ -133,7 +145,7 @@ bool pen_request_from_query(const struct pen_query_pair *pairs, uint32_t count,
         if (strlen(pairs[i].key) > MAX_PATH / 2)
             ok = refuse_key(error, pairs[i].key);
         else {
-            expand(pairs[i].key, info, path);
+            expand(pairs[i].key, pairs[i].value, info, path);
             ok = insert(root, path, pairs[i].key, pairs[i].value, error);
         }
     }

@@ -1,4 +1,5 @@
 /* What programs without a renderer know of the methods is what the methods say of themselves. */
+#include "protocol/json_request.h"
 #include "renderer/catalogue/catalogue.h"
 #include "renderer/renderer.h"
 #include "server/auto/choice.h"
@@ -26,6 +27,23 @@ static void check_param(const struct pen_param *a, const struct pen_param *b)
     CHECK(a->specialise == b->specialise && a->exclusive_min == b->exclusive_min);
 }
 
+/* A bare name of both request and method: its words are the method's. */
+static void check_shared_name(void)
+{
+    struct pen_query_pair pairs[] = {{"technique", "erosion"}, {"variant", "direct"}};
+    struct pen_request request;
+    struct pen_error error = {0};
+    CHECK(pen_request_from_query(pairs, 2, &pen_catalogue, &request, &error));
+    CHECK(!request.variant[0]);
+    const struct pen_technique_info *info = pen_catalogue_find(&pen_catalogue, "erosion");
+    const struct pen_param *row = pen_param_find(info->params, "variant");
+    CHECK(pen_param_load(row, request.technique_params, 0) ==
+          pen_choice_index(row->choices, "direct"));
+    pairs[1].value = "night";
+    CHECK(pen_request_from_query(pairs, 2, &pen_catalogue, &request, &error));
+    CHECK_STR(request.variant, "night");
+}
+
 int main(void)
 {
     const struct pen_catalogue *real = pen_renderer_catalogue();
@@ -44,6 +62,7 @@ int main(void)
         check_list(a->candidates, b->candidates);
         CHECK(a->candidates_need_gpu == b->candidates_need_gpu);
     }
+    check_shared_name();
     /* Every candidate of "auto" is one that it can take, and there is room for all. */
     char keys[AUTO_MAX_ROWS][AUTO_KEY_BYTES];
     uint32_t count = auto_candidates(&pen_catalogue, false, false, keys);

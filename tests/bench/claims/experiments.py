@@ -109,8 +109,8 @@ def erosion(plan, scale):
     for scene in scale.scenes(plan, ("foliage@188000", "hairball@2880000", "columns@1080000")):
         for name, factor in (("small", 0.1), ("wide", 1.0)):
             add(plan, scale, "erosion-" + name, scene, {
-                "erosion": "technique=erosion&params.variant=pcf&map_size=2048&filter_taps=32&smooth=off",
-                "direct": "technique=erosion&params.variant=direct&map_size=2048",
+                "erosion": "technique=erosion&variant=pcf&map_size=2048&filter_taps=32&smooth=off",
+                "direct": "technique=erosion&variant=direct&map_size=2048",
                 "pcss8": pcss + "8", "pcss32": pcss + "32", "pcss64": pcss + "64",
             }, "%s&classify=off&%s" % (scale.size(1920, 1080), light(scene, factor)),
                 truth=scale.large_truth)

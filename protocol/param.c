@@ -3,6 +3,7 @@
 #include <assert.h>
 #include <errno.h>
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -150,7 +151,7 @@ bool pen_param_store_text(const struct pen_param *row, void *object, const char 
             return pen_fail(
                 error, PEN_INVALID, pointer, "%s holds a control character.", row->name);
     memset(to, 0, row->bytes);
-    memcpy(to, text, length);
+    snprintf(to, row->bytes, "%.*s", (int)length, text);
     return true;
 }
 

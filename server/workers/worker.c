@@ -84,11 +84,12 @@ static bool load(struct worker *worker, const struct channel_job *job,
     const struct channel_fds *fds, struct pen_error *error)
 {
     struct pen_renderer *renderer = worker->renderer;
+    uint32_t count = job->image_count < PEN_MAX_LIGHTS ? job->image_count : PEN_MAX_LIGHTS;
     bool ok = pen_renderer_load_scene(renderer, job->request.scene, fds->fd[0], error);
-    for (uint32_t i = 0; ok && i < job->image_count; i++)
+    for (uint32_t i = 0; ok && i < count; i++)
         ok = pen_renderer_load_image(renderer, job->images[i], fds->fd[1 + i], error);
     bool all = ok && pen_renderer_has_scene(renderer, job->request.scene);
-    for (uint32_t i = 0; all && i < job->image_count; i++)
+    for (uint32_t i = 0; all && i < count; i++)
         all = pen_renderer_has_image(renderer, job->images[i]);
     if (ok && !all)
         pen_fail(error, PEN_TOO_BIG, "",

@@ -249,7 +249,7 @@ static void meshopt(void)
             at[1], at[1], at[2] - at[1], at[2 + sequence], at[3 + sequence] - at[2 + sequence],
             sequence ? "INDICES" : "TRIANGLES", at[4], base64(buffer, at[4]));
         for (char *name = json; round >= 2 && (name = strstr(name, "EXT_meshopt"));)
-            memcpy(name, "KHR", 3);
+            name[0] = 'K', name[1] = 'H', name[2] = 'R';
         struct imported r = import_json(json);
         free(json);
         CHECK(r.ok && draws(&r.scene, V(0, 0, 0), V(2, 0, 0), V(2, 2, 0)) &&

@@ -14,7 +14,7 @@ enum { POINTS, LINES, LINE_LOOP, MOST_MODE = 3 };
 #define POINT_OF_SPACING 0.25f /* a point's radius, of the distance if they filled a square ... */
 #define POINT_LEAST 0.001f     /* ... but of the primitive's diagonal at least and at most this */
 #define POINT_MOST 0.01f
-#define LINE_RADIUS 0.004f
+#define LINE_RADIUS 0.002f
 #define LONE_RADIUS 0.01f /* m: where there is no diagonal */
 
 /* A solid in the making: vertices that take all but place and normal from vertex `from`. */

@@ -1,4 +1,5 @@
-"""clang-format has nothing to change in any C, C++ or GLSL file. Exit 77 when it is not installed.
+"""clang-format has nothing to change in any C, C++ or GLSL file. Exit 77 when it is not installed, or
+in another version than the one that the sources were formatted with: they differ in small things.
 format.py --fix rewrites the files instead."""
 import shutil
 import subprocess
@@ -6,10 +7,16 @@ import sys
 
 import tree
 
+VERSION = "14."  # of Debian 12
+
 
 def main():
     if not shutil.which("clang-format"):
-        print("clang-format is not installed")
+        print("skipped: clang-format is not installed")
+        sys.exit(77)
+    found = subprocess.run(["clang-format", "--version"], capture_output=True, text=True).stdout
+    if " version " + VERSION not in found:
+        print("skipped: the sources are formatted by clang-format " + VERSION + "x, this is " + found)
         sys.exit(77)
     names = [name for name in tree.files() if name.endswith((".c", ".h", ".cpp") + tree.GLSL)]
     if sys.argv[1:] == ["--fix"]:

@@ -30,8 +30,10 @@ bool lane_make(
     for (uint32_t i = 0; technique_registry[i]; i++) {
         const struct technique *t = technique_registry[i];
         lane->states[i] = pen_alloc_zero(1, t->state_size);
-        if (t->create && !t->create(&lane->ctx, lane->states[i], error))
+        if (t->create && !t->create(&lane->ctx, lane->states[i], error)) {
+            lane_finish(lane); /* else the next call would take it for made */
             return false;
+        }
     }
     return true;
 }

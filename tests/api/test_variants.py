@@ -121,7 +121,8 @@ class Variants(unittest.TestCase):
     def test_pictures(self):
         """Every method is asked for some variant, raster and rays for all, back and forth."""
         methods = [t["name"] for t in self.d.get("/v1/techniques").json()["techniques"]]
-        some = [m for m in methods if m not in ("raytraced", "pcss")]
+        # what "auto" takes follows measured times and is not the same for two scenes
+        some = [m for m in methods if m not in ("raytraced", "pcss", "auto")]
         shown = {}
         for number, (name, materials) in enumerate(VARIANTS):
             own = tuple(o if m is None else m for o, m in zip(OWN, materials))

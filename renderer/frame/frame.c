@@ -3,6 +3,7 @@
 #include "renderer/frame/layers.h"
 #include "renderer/frame/needs.h"
 #include "renderer/frame/output.h"
+#include "renderer/frame/resolution.h"
 #include "renderer/frame/sky.h"
 #include "renderer/light/meter.h"
 #include "renderer/passes/draw/gbuffer.h"
@@ -30,6 +31,7 @@ struct frame {
     struct pen_result *result;
     uint64_t triangles;
     bool classified; /* at least one light of one frame */
+    bool coarse;     /* said of one light */
     uint32_t number; /* of the jittered frame */
     struct frame_work work;
 };
@@ -178,6 +180,8 @@ static bool record_face(
                                     : 0};
     if (!job->technique->record(&run, error))
         return false;
+    if (f->number == 0)
+        f->coarse = f->coarse || frame_warn_of_resolution(&run);
     *counted |= run.work_counted;
     f->classified |= run.tiles != NULL;
     const struct gl_texture *tiles = run.tiles;

@@ -1,5 +1,6 @@
 """Where surfaces touch, in closed rooms and on wide grounds, no light goes through what casts."""
 import math
+import re
 import unittest
 
 import harness
@@ -185,6 +186,30 @@ class Contact(unittest.TestCase):
                     lit = [v for v, t in zip(seen, truth) if t > 235]
                     self.assertGreater(len(lit), 10000)
                     self.assertLess(sum(v < 120 for v in lit), 0.01 * len(lit))
+
+    def test_what_a_map_is_too_coarse_for_is_said(self):
+        """A map over 2 km, of which the picture shows 2 m; and one over what is shown."""
+        ask = {"width": 160, "height": 120, "ground": False,
+               "camera": {"eye": [0, 2, 3], "target": [0, 0.5, 0], "fov_y_deg": 40},
+               "lights": [{"type": "sun", "position": [0, 10, 0], "target": [0, 0, 0]}]}
+        near = ((1, 1, 1), (0, 0.5, 0), 0)
+        far = [((1, 1, 1), (x, 0.5, z), 0) for x in (-1000, 1000) for z in (-1000, 1000)]
+        floor = ((2002, 0.1, 2002), (0, -0.05, 0), 0)
+        for boxes, size in (([near, floor] + far, 1024), ([near, floor] + far, 256), ([near], 1024)):
+            scene = self.d.upload(solids(*boxes))
+            for method in ("hard", "pcss", "csm"):
+                with self.subTest(boxes=len(boxes), size=size, method=method):
+                    answer = self.d.render(scene, {
+                        **ask, "technique": {"name": method, "params": {"map_size": size}}}, timeout=600)
+                    self.assertEqual(answer.status, 200, answer.body[:300])
+                    said = re.search(r"Texels of the shadow map are (\d+) pixels \(([\d.]+) m\)",
+                                     answer.headers.get("X-Penumbra-Warning", ""))
+                    self.assertEqual(said is not None, len(boxes) > 1)
+                    if said:
+                        self.assertLess(abs(float(said[2]) * size / 2001 - 1), 0.1)
+                        # the camera's axis meets the boxes' tops 1 m below the eye
+                        pixel = 2 * math.hypot(1.5, 3) / 1.5 * math.tan(math.radians(20)) / 120
+                        self.assertLess(abs(int(said[1]) * pixel / float(said[2]) - 1), 0.1)
 
 
 if __name__ == "__main__":

@@ -45,6 +45,20 @@ void pen_result_write_times(struct pen_json *json, const struct pen_result *resu
     pen_json_end(json);
 }
 
+static void write_progress(struct pen_json *json, const struct pen_progress *progress)
+{
+    pen_json_object(json, "progress");
+    pen_json_uint(json, "picture", progress->number);
+    pen_json_uint(json, "samples", progress->done);
+    pen_json_uint(json, "of", progress->total);
+    if (progress->standard_error >= 0)
+        pen_json_float(json, "standard_error", progress->standard_error);
+    else
+        pen_json_null(json, "standard_error");
+    write_ms(json, "elapsed_ms", (double)progress->elapsed_ms);
+    pen_json_end(json);
+}
+
 char *pen_result_json(const struct pen_result *result, const struct pen_record_extra *extra,
     const struct pen_catalogue *catalogue)
 {
@@ -97,6 +111,7 @@ char *pen_result_json(const struct pen_result *result, const struct pen_record_e
     pen_json_uint(&json, "triangles_drawn", result->triangles_drawn);
     pen_json_uint(&json, "rays", result->rays);
     pen_json_uint(&json, "shadow_maps", result->shadow_maps);
+    write_progress(&json, &result->progress);
     pen_json_uint(&json, "gpu_bytes", result->gpu_bytes);
     pen_json_end(&json);
     return pen_json_finish(&json, NULL);

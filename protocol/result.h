@@ -43,6 +43,16 @@ struct pen_comparison {
     uint64_t penumbra_pixels;                        /* 0.02 < reference < 0.98 */
 };
 
+/* How far a picture got; done == total: as far as it goes. */
+struct pen_progress {
+    uint32_t number;      /* of the render's pictures, from 0; the last one counts too */
+    uint32_t done, total; /* light samples of a pixel, over jittered frames; a method that takes its
+                             samples at once counts frames */
+    float standard_error; /* of the mean visibility: root mean square over the picture; < 0: nobody
+                             estimated it */
+    float elapsed_ms;     /* since the renderer began with it */
+};
+
 struct pen_result {
     struct pen_error error;       /* PEN_OK: there is an image */
     struct pen_request completed; /* camera and lights resolved, modes LOOK_AT / given */
@@ -64,7 +74,8 @@ struct pen_result {
     uint64_t rays;        /* of methods that trace */
     uint64_t gpu_bytes;   /* resident scenes, images and shadow inputs */
     uint64_t image_bytes; /* encoded size */
-    double turns_ms;      /* that it had the renderer for itself, one turn after the other */
+    struct pen_progress progress;
+    double turns_ms; /* that it had the renderer for itself, one turn after the other */
     struct pen_program_counts programs;
     struct pen_comparison comparison; /* all 0 unless a reference was given */
 };

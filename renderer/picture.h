@@ -1,6 +1,7 @@
 /* A finished picture in memory. */
 #pragma once
 #include "protocol/request.h"
+#include <stdbool.h>
 
 enum pen_pixel { PEN_PIXEL_RGBA8, PEN_PIXEL_RGBA16F, PEN_PIXEL_RGBA32F };
 
@@ -19,3 +20,14 @@ struct pen_frame {
     struct pen_plane planes[PEN_LAYERS];
 };
 void pen_frame_finish(struct pen_frame *frame);
+
+/* Somebody who watches a render: what of it is there after some of its samples is a picture too. */
+struct pen_result;
+struct pen_viewer {
+    /* Another picture would be taken now. Asked between pieces of work. */
+    bool (*wants)(void *context);
+    /* The picture so far, with its record. The planes are the viewer's from now on. */
+    void (*show)(void *context, const struct pen_frame *frame, const struct pen_result *result);
+    void *context;
+    double share; /* of the render's time may go into pictures after the first */
+};

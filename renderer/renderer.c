@@ -315,6 +315,11 @@ fail:
     return NULL;
 }
 
+void pen_render_watch(struct pen_render *render, const struct pen_viewer *viewer)
+{
+    render->lane.job.viewer = *viewer;
+}
+
 bool pen_render_advance(struct pen_render *render, double ms)
 {
     return lane_advance(&render->lane, ms);

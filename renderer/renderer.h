@@ -52,6 +52,8 @@ bool pen_renderer_can_begin(struct pen_renderer *renderer, const struct pen_requ
 struct pen_render *pen_render_begin(struct pen_renderer *renderer,
     const struct pen_request *request, struct pen_frame *frame, struct pen_result *result,
     struct pen_error *error);
+/* Shows pictures so far to the viewer; before the first pen_render_advance. */
+void pen_render_watch(struct pen_render *render, const struct pen_viewer *viewer);
 /* Goes on for about so many ms, more where a piece cannot be cut. True when it has ended. */
 bool pen_render_advance(struct pen_render *render, double ms);
 /* As pen_renderer_render; one that has not ended gives up at once and fails with PEN_LOST. */

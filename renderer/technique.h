@@ -22,6 +22,7 @@ struct technique_turns {
     struct gl_fiber *fiber; /* NULL: it never does */
     double most_ms;         /* a turn should last at most so long */
     double since_ms;        /* when this one began; gl_now_ms */
+    double used_ms;         /* that those before it took */
     uint32_t number;
     bool cancelled;
     bool held;    /* what is under way must not be interrupted */
@@ -58,6 +59,18 @@ struct gbuffer {
     GLuint framebuffer;        /* of all of them */
 };
 
+/* What the frame does with an estimate that is not complete. */
+enum technique_step {
+    STEP_GO_ON,
+    STEP_SHOW, /* it is to be seen */
+    STEP_STOP, /* it is as good as it gets */
+};
+struct technique_run;
+struct technique_watch {
+    enum technique_step (*step)(struct technique_run *, uint32_t done, uint32_t total);
+    bool (*show)(struct technique_run *, struct pen_error *);
+};
+
 /* One call of a method: one face of one light of one frame. */
 struct technique_run {
     struct technique_ctx *ctx;
@@ -76,6 +89,7 @@ struct technique_run {
     uint32_t width, height;            /* px of vis and G-buffer */
     uint32_t frame;                    /* number of the jittered frame */
     uint32_t light_index;              /* of the request */
+    struct technique_watch *watch;     /* see passes/draw/show.h; NULL: nobody asks */
     /* R32F, or 0: nobody asks. A method that estimates its error adds the square of the standard
      * error of vis.a here, by blending. */
     GLuint variance_framebuffer;

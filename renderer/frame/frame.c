@@ -1,8 +1,10 @@
 #include "renderer/frame/frame.h"
+#include "protocol/container.h"
 #include "renderer/frame/edges.h"
 #include "renderer/frame/layers.h"
 #include "renderer/frame/needs.h"
 #include "renderer/frame/output.h"
+#include "renderer/frame/progress.h"
 #include "renderer/frame/resolution.h"
 #include "renderer/frame/sky.h"
 #include "renderer/light/meter.h"
@@ -33,7 +35,10 @@ struct frame {
     bool classified; /* at least one light of one frame */
     bool coarse;     /* said of one light */
     uint32_t number; /* of the jittered frame */
+    bool sky_known;  /* of this jittered frame */
     struct frame_work work;
+    struct frame_progress progress;
+    struct technique_watch watch;
 };
 
 static void fit_targets(struct frame *f)
@@ -150,6 +155,13 @@ static bool bound_faces(struct frame *f, struct technique_run *run, struct pen_e
     return true;
 }
 
+/* Of the first jittered frame, when all that is drawn before is complete. The next ones are mixed in
+ * whole. */
+static bool is_watchable(const struct frame *f, uint32_t light, uint32_t face)
+{
+    return f->number == 0 && light + 1 == f->light_count && face + 1 == f->lights[light].face_count;
+}
+
 static bool record_face(
     struct frame *f, uint32_t light, uint32_t number, bool *counted, struct pen_error *error)
 {
@@ -175,6 +187,7 @@ static bool record_face(
         .height = job->request->height,
         .frame = f->number,
         .light_index = light,
+        .watch = is_watchable(f, light, number) ? &f->watch : NULL,
         .variance_framebuffer = frame_layers_want_error(job->request, job->technique)
                                     ? job->targets->variance.framebuffer
                                     : 0};
@@ -310,6 +323,14 @@ static bool add_visibility(struct frame *f, struct pen_error *error)
         error);
 }
 
+static bool shade_with_sky(struct frame *f, struct pen_error *error)
+{
+    if (f->job->request->sky.on && !f->sky_known && !sky_occlusion(f->job, error))
+        return false;
+    f->sky_known = true;
+    return shade(f, error);
+}
+
 /* The pass list. */
 static bool render_jittered(struct frame *f, uint32_t number, struct pen_error *error)
 {
@@ -317,12 +338,85 @@ static bool render_jittered(struct frame *f, uint32_t number, struct pen_error *
     bool beauty = frame_needs(r, PEN_SOURCE_BEAUTY),
          visibility = frame_needs(r, PEN_SOURCE_VISIBILITY);
     f->number = number;
+    f->sky_known = false;
     upload_view(f, number);
     return pass_gbuffer(f->job->ctx, f->job->scene, &f->view, r->ground.on,
                &f->job->targets->gbuffer, &f->triangles, error) &&
            (!frame_needs_shadows(r) || record_visibility(f, error)) &&
-           (!beauty || !r->sky.on || sky_occlusion(f->job, error)) &&
-           (!beauty || shade(f, error)) && (!visibility || add_visibility(f, error));
+           (!beauty || shade_with_sky(f, error)) && (!visibility || add_visibility(f, error));
+}
+
+static bool show_frame(struct frame *f, uint32_t frames, struct pen_error *error)
+{
+    const struct frame_job *job = f->job;
+    struct pen_frame picture;
+    struct pen_result result = *f->result;
+    if (!frame_output_read(job, &f->view, frames, &picture, error))
+        return false;
+    gl_timer_collect(&job->ctx->timer, &result);
+    frame_progress_tell(&f->progress, &result);
+    result.turns_ms = frame_progress_ms(&f->progress);
+    job->viewer.show(job->viewer.context, &picture, &result);
+    return true;
+}
+
+/* What of the picture there is to see while its first frame is not complete; the sums start afresh
+ * then. */
+static bool show_estimate(struct frame *f, struct pen_error *error)
+{
+    const struct pen_request *r = f->job->request;
+    struct frame_targets *t = f->job->targets;
+    static const float zero[4] = {0};
+    bool beauty = frame_needs(r, PEN_SOURCE_BEAUTY),
+         visibility = frame_needs(r, PEN_SOURCE_VISIBILITY);
+    bool ok = (!beauty || shade_with_sky(f, error)) && (!visibility || add_visibility(f, error)) &&
+              show_frame(f, 1, error);
+    if (beauty && !frame_output_is_direct(r))
+        gl_target_clear(&t->beauty, zero);
+    if (visibility)
+        gl_target_clear(&t->visibility, zero);
+    return ok;
+}
+
+/* Layers that count the work are only complete with the frame. */
+static bool can_show_estimate(const struct pen_request *r)
+{
+    return r->output.layer != PEN_LAYER_ALL &&
+           (frame_needs(r, PEN_SOURCE_BEAUTY) || frame_needs(r, PEN_SOURCE_VISIBILITY));
+}
+
+static enum technique_step on_step(struct technique_run *run, uint32_t done, uint32_t total)
+{
+    struct frame *f = container_of(run->watch, struct frame, watch);
+    return frame_progress_step(&f->progress, done, total);
+}
+
+static bool on_show(struct technique_run *run, struct pen_error *error)
+{
+    struct frame *f = container_of(run->watch, struct frame, watch);
+    struct frame_progress *p = &f->progress;
+    double begin_ms = frame_progress_ms(p);
+    struct technique_run bounded = *run;
+    bool ok = bound_faces(f, &bounded, error) && frame_progress_compare(p, error) &&
+              (!p->show_wanted || !can_show_estimate(f->job->request) || show_estimate(f, error));
+    aim_face(f, (struct light_face *)run->face);
+    frame_progress_spent(p, begin_ms);
+    return ok;
+}
+
+/* After a jittered frame that is not the last. */
+static bool look_up(struct frame *f, bool *enough, struct pen_error *error)
+{
+    struct frame_progress *p = &f->progress;
+    enum technique_step step = frame_progress_next(p);
+    *enough = step == STEP_STOP;
+    if (step != STEP_SHOW)
+        return true;
+    double begin_ms = frame_progress_ms(p);
+    bool ok =
+        frame_progress_compare(p, error) && (!p->show_wanted || show_frame(f, p->frames, error));
+    frame_progress_spent(p, begin_ms);
+    return ok;
 }
 
 /* What faces the lights squarely comes out just below white, with the sky's share on top. The key
@@ -361,17 +455,23 @@ bool frame_render(const struct frame_job *job, struct pen_frame *frame, struct p
         return false;
     fit_targets(&f);
     frame_layers_begin(job, result);
-    for (uint32_t i = 0; i < r->antialias; i++) {
+    f.watch = (struct technique_watch){on_step, on_show};
+    frame_progress_begin(&f.progress, job, f.light_count);
+    bool enough = false;
+    for (uint32_t i = 0; i < r->antialias && !enough; i++) {
         float x = 0, y = 0;
         if (r->antialias > 1) {
             jitter(i, &x, &y);
             view_jitter(&f.view, x, y);
         }
-        if (!render_jittered(&f, i, error))
+        if (!render_jittered(&f, i, error) || !look_up(&f, &enough, error))
             goto done;
     }
-    if (!frame_output_read(job, &f.view, frame, error))
+    if (f.progress.tracked && !frame_progress_compare(&f.progress, error))
         goto done;
+    if (!frame_output_read(job, &f.view, f.progress.frames, frame, error))
+        goto done;
+    frame_progress_tell(&f.progress, result);
     frame_layers_end(job, &f.work, f.classified, result);
     gl_timer_collect(&job->ctx->timer, result);
     result->shadow_inputs_reused = shadow_cache_all_reused(job->ctx);

@@ -1,6 +1,7 @@
 /* What it takes to make one image. */
 #pragma once
 #include "renderer/frame/targets.h"
+#include "renderer/picture.h"
 #include "renderer/scene/emission.h"
 
 struct frame_job {
@@ -13,4 +14,5 @@ struct frame_job {
     struct emission_cache *emissions;
     const struct scene *(*find_image)(void *owner, const struct pen_light *light);
     void *owner;
+    struct pen_viewer viewer; /* wants NULL: nobody watches */
 };

@@ -42,13 +42,15 @@ void frame_output_fit(struct frame_targets *t, const struct pen_request *r)
 #define SHARED_ROWS "renderer/shaders/frame/output.def"
 #include "renderer/shared/rows_c.h"
 
-static void make_block(const struct frame_job *job, const struct view *view, struct output_block *b)
+static void make_block(
+    const struct frame_job *job, const struct view *view, uint32_t frames, struct output_block *b)
 {
     float center[3], radius = scene_radius(job->scene), distance = 0;
     scene_center(job->scene, center);
     const struct psc_header *h = job->scene->blob.header;
     bool empty = scene_is_empty(job->scene);
-    b->shadings[0] = (float)(job->request->light_count * job->request->antialias);
+    b->shadings[0] = (float)(job->request->light_count * frames);
+    b->shadings[1] = (float)job->request->antialias / (float)frames;
     for (int i = 0; i < 3; i++) {
         b->bounds_min[i] = empty ? -1 : h->bounds_min[i];
         b->bounds_max[i] = empty ? 1 : h->bounds_max[i];
@@ -136,7 +138,7 @@ static void read_plane(
     gl_timer_end(&job->ctx->timer);
 }
 
-bool frame_output_read(const struct frame_job *job, const struct view *view,
+bool frame_output_read(const struct frame_job *job, const struct view *view, uint32_t frames,
     struct pen_frame *frame, struct pen_error *error)
 {
     const struct pen_request *r = job->request;
@@ -144,7 +146,7 @@ bool frame_output_read(const struct frame_job *job, const struct view *view,
     struct output_block block = {0};
     memset(frame, 0, sizeof *frame);
     frame->width = r->width, frame->height = r->height;
-    make_block(job, view, &block);
+    make_block(job, view, frames, &block);
     for (uint32_t layer = 0; layer < PEN_LAYER_ALL; layer++) {
         bool has = pen_layers[layer].source != PEN_SOURCE_VARIANCE ||
                    frame_layers_want_error(r, job->technique);

@@ -8,5 +8,6 @@ bool frame_output_is_direct(const struct pen_request *request);
 
 /* Makes targets->color (and its framebuffer) fit the output. */
 void frame_output_fit(struct frame_targets *targets, const struct pen_request *request);
-bool frame_output_read(const struct frame_job *job, const struct view *view,
+/* `frames`: how many jittered ones are in it. */
+bool frame_output_read(const struct frame_job *job, const struct view *view, uint32_t frames,
     struct pen_frame *frame, struct pen_error *error);

@@ -6,7 +6,8 @@ void frame_targets_finish(struct frame_targets *t)
     struct gbuffer *g = &t->gbuffer;
     struct gl_target *targets[] = {&g->depth, &g->normal, &g->albedo, &g->surface, &g->emission,
         &t->vis, &t->color, &t->beauty, &t->visibility, &t->classes, &t->variance, &t->sky_open[0],
-        &t->sky_open[1], &t->stairs, &t->places};
+        &t->sky_open[1], &t->stairs, &t->places, &t->means[0], &t->means[1], &t->means[2],
+        &t->spread};
     for (size_t i = 0; i < sizeof targets / sizeof *targets; i++)
         gl_target_destroy(targets[i]);
     gl.DeleteFramebuffers(1, &g->framebuffer);

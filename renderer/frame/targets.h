@@ -2,6 +2,7 @@
 #pragma once
 #include "renderer/technique.h"
 
+#define FRAME_MEANS 3
 struct frame_targets {
     struct gbuffer gbuffer;
     struct gl_target vis;    /* RGBA16F array, a layer per light; aimed at the light at work */
@@ -12,6 +13,9 @@ struct frame_targets {
     struct gl_target beauty, visibility; /* RGBA32F */
     struct gl_target classes;            /* RG16F: times proved lit, in umbra */
     struct gl_target variance;           /* R32F: of the squared standard errors */
+    /* Of a picture that is seen before it is complete: R32F, mean visibilities; RG32F, how far they
+     * are apart, by tiles. */
+    struct gl_target means[FRAME_MEANS], spread;
     struct gl_target sky_open[2]; /* R8, half size: how much of the sky is seen; raw, smooth */
 };
 /* Makes a sum fit the request's picture and start at 0. */

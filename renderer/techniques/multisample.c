@@ -1,9 +1,11 @@
 #include "renderer/passes/draw/screen.h"
+#include "renderer/passes/draw/show.h"
 #include "renderer/passes/light/sample_maps.h"
 #include "renderer/techniques/map_params.h"
 #include <string.h>
 
 #define MAX_SAMPLES 1024
+#define FIRST_MAPS 4 /* soon shown */
 
 static const char *const weighting_names[] = {"area", "g", NULL};
 
@@ -49,6 +51,17 @@ static bool add_batch(struct technique_run *run, const struct sample_point *poin
         error);
 }
 
+static bool settle(struct technique_run *run, const struct gl_target *sum, struct pen_error *error)
+{
+    struct pass_texture summed = {UNIT_SOURCE, sum->texture.name, GL_SAMPLE_NEAREST};
+    return pass_screen(run,
+        &(struct pass_screen){.name = "multisample resolve",
+            .body = "multisample_resolve.glsl",
+            .textures = &summed,
+            .texture_count = 1},
+        error);
+}
+
 static bool record(struct technique_run *run, struct pen_error *error)
 {
     const struct multisample *params = run->params;
@@ -59,19 +72,19 @@ static bool record(struct technique_run *run, struct pen_error *error)
     const struct gl_target *sum = pass_sum(run);
     run->bound.map_size = params->map_size;
     run->bound.texels = 2;
-    for (uint32_t first = 0; first < params->samples; first += SAMPLE_MAP_BATCH) {
-        uint32_t left = params->samples - first;
-        uint32_t n = left < SAMPLE_MAP_BATCH ? left : SAMPLE_MAP_BATCH;
+    for (uint32_t first = 0, n; first < params->samples; first += n) {
+        uint32_t left = params->samples - first,
+                 most = first ? SAMPLE_MAP_BATCH - first % SAMPLE_MAP_BATCH : FIRST_MAPS;
+        n = left < most ? left : most;
         if (!add_batch(run, points, first, n, keep, sum, error))
             return false;
+        enum technique_step step = pass_step(run, first + n, params->samples);
+        if (step == STEP_STOP)
+            break;
+        if (step == STEP_SHOW && !(settle(run, sum, error) && pass_show(run, error)))
+            return false;
     }
-    struct pass_texture summed = {UNIT_SOURCE, sum->texture.name, GL_SAMPLE_NEAREST};
-    return pass_screen(run,
-        &(struct pass_screen){.name = "multisample resolve",
-            .body = "multisample_resolve.glsl",
-            .textures = &summed,
-            .texture_count = 1},
-        error);
+    return settle(run, sum, error);
 }
 
 const struct technique technique_multisample = {

@@ -11,6 +11,7 @@ static const size_t payload[CHANNEL_KINDS] = {
     [CHANNEL_HELLO] = sizeof(struct channel_hello),
     [CHANNEL_REFUSED] = sizeof(struct pen_error),
     [CHANNEL_WARM] = sizeof(struct channel_warm),
+    [CHANNEL_PART] = sizeof(struct pen_result),
     [CHANNEL_DONE] = sizeof(struct pen_result),
     [CHANNEL_JOB] = sizeof(struct channel_job),
     [CHANNEL_RESIDENT] = sizeof(struct channel_resident),

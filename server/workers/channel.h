@@ -5,7 +5,7 @@
 #include "server/queue/measure.h"
 #include <stddef.h>
 
-#define CHANNEL_VERSION 4u
+#define CHANNEL_VERSION 5u
 #define CHANNEL_MAX_JOBS 8  /* that a worker has at a time, being encoded or not */
 #define CHANNEL_WORKER_FD 3 /* the worker's end */
 #define CHANNEL_MAX_FDS (2 + PEN_MAX_LIGHTS)
@@ -20,11 +20,16 @@ enum channel_kind {
     CHANNEL_STARTED,   /* worker: the GL thread takes this job */
     CHANNEL_TURN,      /* worker: it is alive, and from now on this job has its turns */
     CHANNEL_RENDERED,  /* worker: the GL thread is done with it, encoding follows */
+    CHANNEL_PART,      /* worker: the picture so far, as CHANNEL_DONE has it; the job goes on */
     CHANNEL_DONE,     /* worker: the answer; a sealed memfd for each thing that enum measure says */
     CHANNEL_RESIDENT, /* worker: the scenes in GPU memory, when they have changed */
     CHANNEL_JOB,      /* front end: descriptors: the scene's blob, `image_count` images, and the
                           reference's planes when there is something to compare with */
     CHANNEL_CANCEL,   /* front end: nobody waits for this job; it is answered all the same */
+    CHANNEL_WANT,     /* front end: the job's picture so far would be taken. Each is answered by one
+                          CHANNEL_PART at most, and two without one in between count as one, so that
+                          nobody gets more than he takes. No CHANNEL_PART comes after CHANNEL_DONE;
+                          one whose job is unknown is ignored. */
     CHANNEL_DROP,     /* front end: the scene was deleted */
     CHANNEL_KINDS
 };
@@ -44,7 +49,9 @@ struct channel_job {
     struct pen_request request;
     uint64_t client; /* with whom its time on the device is shared; 0: a client of its own */
     uint32_t image_count;
-    uint32_t measure;                             /* enum measure */
+    uint32_t measure; /* enum measure */
+    uint32_t parts;   /* 1: as if a CHANNEL_WANT followed */
+    uint32_t reserved;
     uint8_t images[PEN_MAX_LIGHTS][PEN_ID_BYTES]; /* in the order of the descriptors */
 };
 #define CHANNEL_MAX_RESIDENT 128 /* the ones used last, if there are more */

@@ -108,7 +108,27 @@ static struct worker_item *make_item(const struct channel_message *message)
     item->output = job->request.output;
     item->measure = job->measure;
     item->reference_fd = -1;
+    item->part_wanted = job->parts != 0;
     return item;
+}
+
+/* What the renderer does not know of an answer. */
+static void complete(const struct worker *worker, struct worker_item *item)
+{
+    struct pen_result *result = &item->message.result;
+    result->completed.output = item->output;
+    result->stage_ms[PEN_STAGE_LOAD] = item->load_ms; /* the render started afresh */
+    result->scene_was_resident = item->was_resident;
+    result->device = *pen_renderer_device(worker->renderer);
+    result->gpu_bytes = pen_renderer_gpu_bytes(worker->renderer);
+    result->programs = pen_renderer_programs(worker->renderer);
+}
+
+static void on_part(void *context, struct worker_item *part)
+{
+    struct worker *worker = context;
+    complete(worker, part);
+    worker_encoder_submit(worker->encoder, part);
 }
 
 /* Hands a render that has ended to the encoders; failures too: they answer. False when the context
@@ -121,12 +141,7 @@ static bool hand_over(struct worker *worker, struct worker_item *item)
         free(item);
         return false;
     }
-    result->completed.output = item->output;
-    result->stage_ms[PEN_STAGE_LOAD] = item->load_ms; /* the render started afresh */
-    result->scene_was_resident = item->was_resident;
-    result->device = *pen_renderer_device(renderer);
-    result->gpu_bytes = pen_renderer_gpu_bytes(renderer);
-    result->programs = pen_renderer_programs(renderer);
+    complete(worker, item);
     tell_resident(worker, result->completed.scene); /* before the answer, so that both agree */
     send_or_exit(&(struct channel_message){CHANNEL_VERSION, CHANNEL_RENDERED, item->message.job});
     worker_encoder_submit(worker->encoder, item);
@@ -210,6 +225,14 @@ static bool cancel_job(struct worker *worker, uint64_t job)
     return !item || hand_over(worker, item);
 }
 
+static void want_part(struct worker *worker, uint64_t job)
+{
+    worker_turns_want(worker->turns, job);
+    for (uint32_t i = 0; i < worker->waiting_count; i++)
+        if (worker->waiting[i].message.job == job)
+            worker->waiting[i].message.job_data.parts = 1;
+}
+
 /* Tells the daemon whose turn it is: when that changes, and now and then as a sign of life. */
 static void tell_turn(struct worker *worker, uint64_t job)
 {
@@ -248,6 +271,9 @@ static bool take_message(
         return take_job(worker, message, fds);
     case CHANNEL_CANCEL:
         return cancel_job(worker, message->job);
+    case CHANNEL_WANT:
+        want_part(worker, message->job);
+        return true;
     case CHANNEL_DROP:
         drop(worker, message->drop.scene);
         return true;
@@ -321,7 +347,7 @@ int main(int argc, char **argv)
         send_or_exit(&hello);
         return EXIT_REFUSED;
     }
-    worker.turns = worker_turns_create(worker.renderer);
+    worker.turns = worker_turns_create(worker.renderer, on_part, &worker);
     worker.encoder = worker_encoder_create(CHANNEL_WORKER_FD);
     hello.kind = CHANNEL_HELLO;
     hello.hello.pid = (uint32_t)getpid();

@@ -1,17 +1,19 @@
-/* A finished frame on its way through the worker's encoder threads. */
+/* A finished frame, or one so far, on its way through the worker's encoder threads. */
 #pragma once
 #include "renderer/picture.h"
 #include "server/workers/channel.h"
 
 struct worker_item { /* allocated by the caller, freed by the encoder */
     struct worker_item *next;
-    struct channel_message message; /* CHANNEL_DONE; with an error there is no frame */
+    struct channel_message
+        message; /* CHANNEL_DONE or CHANNEL_PART; with an error there is no frame */
     struct pen_output output;
     uint32_t measure; /* enum measure */
     int reference_fd; /* planes to compare with, the item's own; -1: none */
     struct pen_frame frame;
     float load_ms;
     bool was_resident;
+    bool part_wanted; /* a picture so far would be taken */
 };
 
 struct pen_bytes;

@@ -154,6 +154,8 @@ static bool on_message(
             slot->resident.count = 0;
         pthread_mutex_unlock(&slot->pool->lock);
         return true;
+    case CHANNEL_PART: /* nobody asked for it */
+        return true;
     case CHANNEL_DONE:
         on_done(slot, message, fds);
         return true;

@@ -10,7 +10,8 @@
 #define UNDISTURBED_MS 100.0
 /* What a client who was away may use before those who were there all the time get their share. */
 #define CREDIT_MS 1000.0
-#define BATCH_COST 8.0 /* a batch's time counts so many times */
+#define PART_SHARE 0.06 /* of a render's time, for pictures of it on the way */
+#define BATCH_COST 8.0  /* a batch's time counts so many times */
 
 struct client {
     uint64_t id; /* 0: unused */
@@ -19,6 +20,7 @@ struct client {
 };
 
 struct turn {
+    struct worker_turns *turns;
     struct pen_render *render; /* NULL: unused */
     struct worker_item *item;
     uint64_t client, arrived;
@@ -32,13 +34,37 @@ struct worker_turns {
     struct turn *current; /* who had or has the turn; NULL: none */
     struct client clients[CLIENTS];
     uint64_t arrivals;
+    void (*on_part)(void *context, struct worker_item *part);
+    void *context;
 };
 
-struct worker_turns *worker_turns_create(struct pen_renderer *renderer)
+struct worker_turns *worker_turns_create(struct pen_renderer *renderer,
+    void (*on_part)(void *context, struct worker_item *part), void *context)
 {
     struct worker_turns *t = pen_alloc_zero(1, sizeof *t);
     t->renderer = renderer;
+    t->on_part = on_part;
+    t->context = context;
     return t;
+}
+
+static bool wants_part(void *context)
+{
+    const struct turn *turn = context;
+    return turn->item->part_wanted;
+}
+
+static void show_part(void *context, const struct pen_frame *frame, const struct pen_result *result)
+{
+    struct turn *turn = context;
+    struct worker_item *part = pen_alloc(1, sizeof *part);
+    *part = *turn->item;
+    turn->item->part_wanted = false;
+    part->message.kind = CHANNEL_PART;
+    part->message.result = *result;
+    part->reference_fd = -1;
+    part->frame = *frame;
+    turn->turns->on_part(turn->turns->context, part);
 }
 
 static struct worker_item *finish(struct worker_turns *t, struct turn *turn)
@@ -115,7 +141,10 @@ bool worker_turns_begin(struct worker_turns *t, const struct pen_request *reques
         return false;
     }
     uint64_t number = ++t->arrivals;
-    *turn = (struct turn){.render = render,
+    if (item->measure == MEASURE_PICTURE)
+        pen_render_watch(render, &(struct pen_viewer){wants_part, show_part, turn, PART_SHARE});
+    *turn = (struct turn){.turns = t,
+        .render = render,
         .item = item,
         .client = client ? client : ~number, /* nobody has such a number */
         .arrived = number,
@@ -179,4 +208,11 @@ struct worker_item *worker_turns_cancel(struct worker_turns *t, uint64_t job)
         if (t->turns[i].render && t->turns[i].item->message.job == job)
             return finish(t, &t->turns[i]);
     return NULL;
+}
+
+void worker_turns_want(struct worker_turns *t, uint64_t job)
+{
+    for (uint32_t i = 0; i < PEN_MAX_RENDERS; i++)
+        if (t->turns[i].render && t->turns[i].item->message.job == job)
+            t->turns[i].item->part_wanted = true;
 }

@@ -8,7 +8,9 @@
 #define WORKER_TURN_MS 25.0
 
 struct worker_turns;
-struct worker_turns *worker_turns_create(struct pen_renderer *renderer);
+/* `on_part` gets pictures so far, each an item of its own, of jobs for which they are wanted. */
+struct worker_turns *worker_turns_create(struct pen_renderer *renderer,
+    void (*on_part)(void *context, struct worker_item *part), void *context);
 void worker_turns_destroy(struct worker_turns *turns); /* gives up what is in progress */
 
 /* There is a place for it, and its scene is in use in no other pose. */
@@ -17,6 +19,8 @@ bool worker_turns_have_room(const struct worker_turns *turns, const struct pen_r
  * with the turns until they give it back, unless this fails with item->message.result.error. */
 bool worker_turns_begin(struct worker_turns *turns, const struct pen_request *request,
     uint64_t client, struct worker_item *item);
+/* The job's picture so far would be taken, once. Nothing happens when it is not in progress. */
+void worker_turns_want(struct worker_turns *turns, uint64_t job);
 /* The job whose turn is next; 0: none is in progress. */
 uint64_t worker_turns_next(struct worker_turns *turns);
 /* One turn of that job. Its item once it has ended, well or not; else NULL. */

@@ -41,6 +41,7 @@ bool pass_turn(struct technique_ctx *ctx, struct pen_error *error)
     follow_device(ctx);
     double now = gl_now_ms();
     if (!turns->cancelled && now - turns->since_ms >= turns->most_ms) {
+        turns->used_ms += now - turns->since_ms;
         gl_timer_stop(&ctx->timer);
         gl_fiber_pause(turns->fiber);
         gl_timer_go_on(&ctx->timer);

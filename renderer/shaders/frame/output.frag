@@ -32,7 +32,7 @@ vec4 grey(float v)
 vec4 layer_beauty()
 {
     // Multiplied by alpha, as EXR has it; files of integers hold the colour as it is.
-    vec4 sum = texelFetch(accumulated, pixel, 0);
+    vec4 sum = texelFetch(accumulated, pixel, 0) * range.shadings.y;
     if (RAW)
         return vec4(sum.rgb * view.display.x, sum.a);
     return sum.a > 0.0 ? vec4(display_encode(sum.rgb / sum.a), sum.a) : vec4(0.0);
@@ -40,12 +40,12 @@ vec4 layer_beauty()
 
 vec4 layer_visibility()
 {
-    return texelFetch(accumulated, pixel, 0);
+    return texelFetch(accumulated, pixel, 0) * range.shadings.y;
 }
 
 vec4 layer_penumbra()
 {
-    float v = texelFetch(accumulated, pixel, 0).a;
+    float v = texelFetch(accumulated, pixel, 0).a * range.shadings.y;
     float kind = v >= 0.999 ? 0.0 : v <= 0.001 ? 2.0 : 1.0;
     return grey(RAW ? kind : 0.5 * kind);
 }

@@ -1,0 +1,150 @@
+#include "renderer/frame/progress.h"
+#include "protocol/memory.h"
+#include "renderer/passes/draw/screen.h"
+#include <math.h>
+#include <stdlib.h>
+
+#define SHARED_ROWS "renderer/shaders/frame/progress.def"
+#include "renderer/shared/rows_c.h"
+
+void frame_progress_begin(struct frame_progress *p, const struct frame_job *job, uint32_t lights)
+{
+    *p = (struct frame_progress){
+        .job = job, .lights = lights, .begun_ms = gl_now_ms(), .standard_error = -1, .total = 1};
+    p->tracked = job->viewer.wants && job->viewer.wants(job->viewer.context);
+}
+
+double frame_progress_ms(const struct frame_progress *p)
+{
+    const struct technique_turns *turns = &p->job->ctx->turns;
+    return turns->used_ms + gl_now_ms() - turns->since_ms;
+}
+
+void frame_progress_spent(struct frame_progress *p, double begin_ms)
+{
+    p->last_extra_ms = frame_progress_ms(p) - begin_ms;
+    p->extra_ms += p->last_extra_ms;
+}
+
+/* An estimate of so many samples in all. */
+static enum technique_step step(struct frame_progress *p, uint32_t samples)
+{
+    double now = frame_progress_ms(p);
+    p->increment_ms = now - p->step_ms;
+    p->step_ms = now;
+    const struct pen_viewer *viewer = &p->job->viewer;
+    bool first = !p->shown && !p->kept_done;
+    if (!first && p->extra_ms + p->last_extra_ms > viewer->share * now)
+        return STEP_GO_ON;
+    p->show_wanted = viewer->wants && viewer->wants(viewer->context);
+    bool compare = p->tracked && samples >= 2 * p->kept_done;
+    return p->show_wanted || compare ? STEP_SHOW : STEP_GO_ON;
+}
+
+enum technique_step frame_progress_step(struct frame_progress *p, uint32_t done, uint32_t total)
+{
+    p->done = done;
+    p->total = total;
+    return done < total ? step(p, p->frames * total + done) : STEP_GO_ON;
+}
+
+enum technique_step frame_progress_next(struct frame_progress *p)
+{
+    p->frames++;
+    p->done = 0;
+    return p->frames < p->job->request->antialias ? step(p, p->frames * p->total) : STEP_GO_ON;
+}
+
+static bool draw(const struct frame_progress *p, uint32_t to, const struct pass_texture *textures,
+    uint32_t texture_count, const char *name, const struct progress_block *block,
+    struct pen_error *error)
+{
+    struct frame_targets *t = p->job->targets;
+    bool spread = to == FRAME_MEANS;
+    const struct gl_target *target = spread ? &t->spread : &t->means[to];
+    return pass_fill(p->job->ctx,
+        &(struct pass_fill){.name = name,
+            .fragment = "progress.frag",
+            .defines = spread ? "#define SPREAD\n" : NULL,
+            .stage = PEN_STAGE_SHADE,
+            .textures = textures,
+            .texture_count = texture_count,
+            .framebuffer = target->framebuffer,
+            .width = target->texture.width,
+            .height = target->texture.height,
+            .extra = block,
+            .extra_bytes = sizeof *block},
+        error);
+}
+
+/* Of two estimates of which the later contains the earlier, n of m samples, the difference has the
+ * variance s^2 (1/n - 1/m), and the later itself s^2 / m: two batch means (W. Cochran, Sampling
+ * Techniques, 3rd ed., section 2.15: two random groups). Nets do better than independent samples, so
+ * that this errs on the side of too large. */
+static bool estimate(struct frame_progress *p, struct pen_error *error)
+{
+    const struct pen_request *r = p->job->request;
+    struct frame_targets *t = p->job->targets;
+    uint32_t width = (r->width + PROGRESS_TILE - 1) / PROGRESS_TILE;
+    uint32_t height = (r->height + PROGRESS_TILE - 1) / PROGRESS_TILE;
+    gl_target_fit(&t->spread, GL_RG32F, width, height, 0, 1);
+    struct progress_block block = {{0}};
+    struct pass_texture textures[] = {
+        {UNIT_DEPTH, t->gbuffer.depth.texture.name, GL_SAMPLE_NEAREST},
+        {UNIT_MEAN, t->means[p->now].texture.name, GL_SAMPLE_NEAREST},
+        {UNIT_MEAN_BEFORE, t->means[p->kept].texture.name, GL_SAMPLE_NEAREST}};
+    if (!draw(p, FRAME_MEANS, textures, 3, "spread", &block, error))
+        return false;
+    float *sums = pen_alloc((size_t)width * height, 2 * sizeof *sums);
+    gl.BindFramebuffer(GL_FRAMEBUFFER, t->spread.framebuffer);
+    gl.PixelStorei(GL_PACK_ALIGNMENT, 1);
+    gl.ReadPixels(0, 0, (GLsizei)width, (GLsizei)height, GL_RG, GL_FLOAT, sums);
+    double squares = 0, pixels = 0;
+    for (size_t i = 0; i < (size_t)width * height; i++) {
+        squares += (double)sums[2 * i];
+        pixels += (double)sums[2 * i + 1];
+    }
+    free(sums);
+    double share = (double)p->kept_done / (p->now_done - p->kept_done);
+    p->standard_error = pixels > 0 ? (float)sqrt(squares / pixels * share) : 0;
+    return true;
+}
+
+bool frame_progress_compare(struct frame_progress *p, struct pen_error *error)
+{
+    const struct pen_request *r = p->job->request;
+    struct frame_targets *t = p->job->targets;
+    uint32_t samples = p->frames * p->total + p->done, next = 0;
+    if (samples == p->now_done)
+        return true;
+    while ((p->now_done && next == p->now) || (p->kept_done && next == p->kept))
+        next++;
+    gl_target_fit(&t->means[next], GL_R32F, r->width, r->height, 0, 1);
+    /* Of jittered frames the mean of all. */
+    float weight = p->frames > 1 && p->now_done ? 1 / (float)p->frames : 1;
+    struct progress_block block = {
+        .mean = {(float)p->lights, weight, p->lights ? 1 / (float)p->lights : 1}};
+    struct pass_texture textures[] = {{UNIT_SOURCE, t->vis.texture.name, GL_SAMPLE_NEAREST},
+        {UNIT_MEAN_BEFORE, t->means[p->now].texture.name, GL_SAMPLE_NEAREST}};
+    if (!draw(p, next, textures, 2, "mean", &block, error))
+        return false;
+    p->now = next;
+    p->now_done = samples;
+    if (p->kept_done && !estimate(p, error))
+        return false;
+    if (samples >= 2 * p->kept_done) {
+        p->kept = p->now;
+        p->kept_done = samples;
+    }
+    return true;
+}
+
+void frame_progress_tell(struct frame_progress *p, struct pen_result *result)
+{
+    uint32_t total = p->total * p->job->request->antialias;
+    result->progress = (struct pen_progress){.number = p->shown++,
+        .done = p->frames * p->total + p->done,
+        .total = total,
+        .standard_error = p->standard_error,
+        .elapsed_ms = (float)(gl_now_ms() - p->begun_ms)};
+}

@@ -1,0 +1,38 @@
+/* How far a picture is: which of its estimates are shown, when it has to end, and how far off it may
+ * be. */
+#pragma once
+#include "renderer/frame/job.h"
+
+struct frame_progress {
+    const struct frame_job *job;
+    uint32_t lights;
+    bool tracked;         /* estimates of its error are wanted */
+    double begun_ms;      /* gl_now_ms */
+    double extra_ms;      /* that pictures and estimates took, of the render's own time */
+    double last_extra_ms; /* the last of them */
+    double step_ms;       /* the render's time at the last step, */
+    double increment_ms;  /* and between the last two */
+    uint32_t shown;       /* pictures */
+    uint32_t frames;      /* jittered ones that are complete */
+    uint32_t done, total; /* samples of the frame at hand */
+    /* The mean visibility after so many samples, in targets->means[]: as it is now, and an earlier
+     * one to compare it with. */
+    uint32_t now, now_done, kept, kept_done; /* done 0: none */
+    float standard_error;                    /* < 0: not estimated */
+    bool show_wanted;
+};
+
+void frame_progress_begin(struct frame_progress *p, const struct frame_job *job, uint32_t lights);
+/* What is to be done with an estimate from `done` of `total` samples of the frame at hand. */
+enum technique_step frame_progress_step(struct frame_progress *p, uint32_t done, uint32_t total);
+/* Another jittered frame is complete; STEP_STOP: there is no time for the next one. */
+enum technique_step frame_progress_next(struct frame_progress *p);
+/* vis holds an estimate for all lights: takes its mean in, and estimates the error from what it
+ * differs from an earlier one. */
+bool frame_progress_compare(struct frame_progress *p, struct pen_error *error);
+/* Time since `begin_ms`, of the render's own, was spent on a picture or an estimate. */
+void frame_progress_spent(struct frame_progress *p, double begin_ms);
+/* The time that the render has had so far. */
+double frame_progress_ms(const struct frame_progress *p);
+/* Says in the result how far the next picture got. */
+void frame_progress_tell(struct frame_progress *p, struct pen_result *result);

@@ -56,11 +56,6 @@ struct used_bits {
 };
 _Static_assert(LIGHT_PAGES <= 4 * LIGHT_PAGE_WORDS, "every page has a word");
 
-struct state {
-    struct gl_target bits[BIT_GROUPS];
-    GLuint counters, queries[MAX_TESTED];
-};
-
 /* One face's refinement. */
 struct refinement {
     struct technique_run *run;
@@ -72,6 +67,12 @@ struct refinement {
     const struct gl_texture *maps[LIGHT_PAGES];
     const struct gl_target *sum; /* of the filtered lookups; NULL without a filter */
     uint32_t pages, most_maps;
+};
+
+struct state {
+    struct gl_target bits[BIT_GROUPS];
+    GLuint counters, queries[MAX_TESTED];
+    struct refinement refinement; /* too large for the stack */
 };
 
 static bool create(struct technique_ctx *ctx, void *data, struct pen_error *error)
@@ -379,44 +380,44 @@ static uint32_t deepest_level(const struct technique_run *run)
 
 static bool record(struct technique_run *run, struct pen_error *error)
 {
-    static struct refinement r; /* large, and only one thread renders */
+    struct refinement *r = &((struct state *)run->state)->refinement;
     const struct adaptive_sampling *params = run->params;
     uint64_t map_bytes = (uint64_t)params->map_size * params->map_size * 4;
     uint64_t most = run->ctx->shadow_budget / map_bytes;
     uint32_t deepest = deepest_level(run);
     bool point = !(run->face->extent[0] > 0 || run->face->extent[1] > 0);
     bool short_of = !point && deepest < params->levels;
-    memset(&r, 0, sizeof r);
-    r.run = run;
-    r.most_maps = most < LIGHT_TREE_POINTS ? (uint32_t)most : 2 * LIGHT_TREE_POINTS; /* no limit */
-    r.min_max = pass_caster_min_max(run, MIN_MAX_SIZE, error);
-    if (!r.min_max)
+    memset(r, 0, sizeof *r);
+    r->run = run;
+    r->most_maps = most < LIGHT_TREE_POINTS ? (uint32_t)most : 2 * LIGHT_TREE_POINTS; /* no limit */
+    r->min_max = pass_caster_min_max(run, MIN_MAX_SIZE, error);
+    if (!r->min_max)
         return false;
     struct classify_desc classes = {.map_size = MIN_MAX_SIZE,
         .margin_texels = (float)(params->kernel + 1) * MIN_MAX_SIZE / (float)params->map_size};
-    if (!pass_classify(run, &classes, &r.tiles, error))
+    if (!pass_classify(run, &classes, &r->tiles, error))
         return false;
     for (uint32_t i = 0; i < LIGHT_TREE_POINTS; i++)
-        r.points[i] = sample_point_at(
+        r->points[i] = sample_point_at(
             run->face, (float)(i % LIGHT_TREE_SIDE) / 8 - 1, (float)(i / LIGHT_TREE_SIDE) / 8 - 1);
-    light_tree_begin(&r.tree);
-    if (!test_points(&r, error))
+    light_tree_begin(&r->tree);
+    if (!test_points(r, error))
         return false;
     for (uint32_t level = 0; level < deepest; level++) {
-        uint32_t before = r.tree.count;
-        int refused = split_level(&r, level, error);
+        uint32_t before = r->tree.count;
+        int refused = split_level(r, level, error);
         if (refused < 0)
             return false;
         short_of |= refused > 0;
-        if (r.tree.count == before)
+        if (r->tree.count == before)
             break;
-        if (!test_points(&r, error))
+        if (!test_points(r, error))
             return false;
     }
     if (short_of && !run->result->warning_count)
         pen_result_warn(
             run->result, "The light is divided less finely than asked: its maps need more memory.");
-    return (params->kernel == 1 || filter_pages(&r, error)) && resolve(&r, error);
+    return (params->kernel == 1 || filter_pages(r, error)) && resolve(r, error);
 }
 
 const struct technique technique_adaptive_sampling = {

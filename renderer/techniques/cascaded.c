@@ -80,7 +80,8 @@ struct cascade {
 
 struct state {
     struct gl_target tiles;
-    float (*depth)[2]; /* tiles on the CPU */
+    float (*depth)[2];      /* tiles on the CPU */
+    struct cascade cascade; /* the one at hand, too large for the stack */
 };
 
 static void destroy(struct technique_ctx *ctx, void *data)
@@ -157,7 +158,7 @@ static void make_views(struct technique_run *run, struct cascade *c)
     }
 }
 
-/* What build_maps draws: the builder only gets the run. One GL thread per process. */
+/* What build_maps draws: the builder only gets the run, and looks before it can give way. */
 static const struct cascade *pending;
 
 static bool build_maps(struct technique_run *run, const struct shadow_key *key,
@@ -264,17 +265,17 @@ static bool record(struct technique_run *run, struct pen_error *error)
         return false;
     const struct gl_target *sum = pass_sum(run);
     for (uint32_t i = 0; i < CASCADES; i++) {
-        static struct cascade c; /* large, and only one thread renders */
+        struct cascade *c = &((struct state *)run->state)->cascade;
         bool point = !(face->extent[0] > 0 || face->extent[1] > 0);
-        c.number = i;
-        c.side = point ? 1 : sides[i];
-        c.map_size = sizes[i];
-        c.kernel = kernels[i];
-        make_fade(bounds, i, params->blend, c.block.fade);
-        if (!cascade_bounds(run->view, face, &depth_tiles, fmaxf(c.block.fade[0], range[0]),
-                fminf(c.block.fade[3], range[1]), &c.bounds))
+        c->number = i;
+        c->side = point ? 1 : sides[i];
+        c->map_size = sizes[i];
+        c->kernel = kernels[i];
+        make_fade(bounds, i, params->blend, c->block.fade);
+        if (!cascade_bounds(run->view, face, &depth_tiles, fmaxf(c->block.fade[0], range[0]),
+                fminf(c->block.fade[3], range[1]), &c->bounds))
             continue;
-        if (!add_cascade(run, &c, tiles, min_max, sum, error))
+        if (!add_cascade(run, c, tiles, min_max, sum, error))
             return false;
     }
     struct pass_texture summed = {UNIT_SOURCE, sum->texture.name, GL_SAMPLE_NEAREST};

@@ -66,33 +66,37 @@ static uint64_t whole(struct pen_renderer *r, const struct pen_request *request)
     return hash;
 }
 
-/* Both side by side, a turn each; returns the number of turns. */
-static uint32_t in_turns(struct pen_renderer *r, const struct pen_request *const requests[2],
-    double ms, uint64_t hashes[2])
+#define ABREAST 3
+
+/* All side by side, a turn each; returns the number of turns. */
+static uint32_t in_turns(struct pen_renderer *r, const struct pen_request requests[ABREAST],
+    double ms, uint64_t hashes[ABREAST])
 {
-    static struct pen_result results[2];
-    struct pen_frame frames[2];
+    static struct pen_result results[ABREAST];
+    struct pen_frame frames[ABREAST];
     struct pen_error error = {0};
-    struct pen_render *renders[2];
-    bool ended[2] = {false, false};
-    uint32_t turns = 0;
+    struct pen_render *renders[ABREAST];
+    bool ended[ABREAST] = {false};
+    uint32_t turns = 0, left = ABREAST;
     pen_renderer_drop_shadows(r);
-    for (int k = 0; k < 2; k++)
-        renders[k] = pen_render_begin(r, requests[k], &frames[k], &results[k], &error);
-    if (!renders[0] || !renders[1]) {
-        fprintf(stderr, "%s\n", error.message);
-        return 0;
+    for (int k = 0; k < ABREAST; k++) {
+        renders[k] = pen_render_begin(r, &requests[k], &frames[k], &results[k], &error);
+        if (!renders[k]) {
+            fprintf(stderr, "%s\n", error.message);
+            return 0;
+        }
     }
-    while (!ended[0] || !ended[1])
-        for (int k = 0; k < 2; k++)
+    while (left)
+        for (int k = 0; k < ABREAST; k++)
             if (!ended[k]) {
                 ended[k] = pen_render_advance(renders[k], ms);
+                left -= ended[k];
                 turns++;
             }
-    for (int k = 0; k < 2; k++) {
+    for (int k = 0; k < ABREAST; k++) {
         hashes[k] = 0;
         if (!pen_render_end(renders[k], &error))
-            fprintf(stderr, "%s: %s\n", requests[k]->technique, error.message);
+            fprintf(stderr, "%s: %s\n", requests[k].technique, error.message);
         else
             hashes[k] = hash_frame(&frames[k]);
         pen_frame_finish(&frames[k]);
@@ -117,34 +121,38 @@ static void make_cheap(struct pen_request *request, double samples)
     set_number(request, "series_size", 256);
 }
 
-/* Every method beside every neighbour in the list, with other sizes, cameras and lights. */
+/* Every method beside its neighbour in the list, with other sizes, cameras and lights, and beside
+ * itself. */
 static void check_methods(struct pen_renderer *r, const uint8_t scenes[2][PEN_ID_BYTES])
 {
     const struct pen_catalogue *catalogue = pen_renderer_catalogue();
     for (uint32_t i = 0; i < catalogue->count; i++) {
-        struct pen_request a, b;
-        fixture_request(&a, scenes[0], catalogue->items[i]->name);
-        fixture_request(&b, scenes[1], catalogue->items[(i + 1) % catalogue->count]->name);
-        a.antialias = 2;
-        a.height = 200; /* more than a band */
-        b.width = 333, b.height = 130;
-        b.lights_given = true;
-        b.light_count = 2;
+        struct pen_request all[ABREAST], *a = &all[0], *b = &all[1], *c = &all[2];
+        fixture_request(a, scenes[0], catalogue->items[i]->name);
+        fixture_request(b, scenes[1], catalogue->items[(i + 1) % catalogue->count]->name);
+        fixture_request(c, scenes[1], catalogue->items[i]->name);
+        a->antialias = 2;
+        a->height = 200; /* more than a band */
+        b->width = 333, b->height = 130;
+        b->lights_given = true;
+        b->light_count = 2;
         for (int k = 0; k < 2; k++) {
-            pen_light_default(&b.lights[k], k ? PEN_LIGHT_RECT : PEN_LIGHT_SUN);
-            b.lights[k].position[0] = 2 * k, b.lights[k].position[1] = 4;
-            b.lights[k].position[2] = 1;
+            pen_light_default(&b->lights[k], k ? PEN_LIGHT_RECT : PEN_LIGHT_SUN);
+            b->lights[k].position[0] = 2 * k, b->lights[k].position[1] = 4;
+            b->lights[k].position[2] = 1;
         }
-        make_cheap(&a, 20);
-        make_cheap(&b, 20);
-        uint64_t expected[2] = {whole(r, &a), whole(r, &b)}, got[2];
-        CHECK(expected[0] && expected[1]);
-        const struct pen_request *requests[2] = {&a, &b};
-        uint32_t turns = in_turns(r, requests, SHORTEST, got);
-        printf("%s beside %s: %u turns\n", a.technique, b.technique, turns);
+        c->width = 100, c->height = 70;
+        uint64_t expected[ABREAST], got[ABREAST];
+        for (int k = 0; k < ABREAST; k++) {
+            make_cheap(&all[k], 20);
+            expected[k] = whole(r, &all[k]);
+            CHECK(expected[k]);
+        }
+        uint32_t turns = in_turns(r, all, SHORTEST, got);
+        printf("%s beside %s: %u turns\n", a->technique, b->technique, turns);
         CHECK(turns > 8);
-        CHECK(got[0] == expected[0]);
-        CHECK(got[1] == expected[1]);
+        for (int k = 0; k < ABREAST; k++)
+            CHECK(got[k] == expected[k]);
     }
 }
 

@@ -1,12 +1,14 @@
 #include "renderer/renderer.h"
 #include "protocol/memory.h"
 #include "renderer/lane.h"
+#include "renderer/frame/output.h"
 #include "renderer/generate/generate.h"
 #include "renderer/gl/context.h"
 #include "renderer/passes/map/shadow_cache.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 #define TECHNIQUE(name) extern const struct technique technique_##name;
 #include "renderer/techniques/registry.def"
@@ -25,11 +27,14 @@ enum {
 #undef TECHNIQUE
 
 #define MAX_RESIDENT 256
+#define DEFAULT_BUDGET (2ull << 30)
 #define EMISSION_BYTES (64u << 20) /* kept emission textures; they are cheap to make again */
 
 struct pen_render {
     struct pen_renderer *renderer;
     struct lane lane;
+    uint64_t target_bytes; /* of its lane */
+    uint64_t need;         /* what these are expected to come to */
 };
 
 struct pen_renderer {
@@ -42,6 +47,7 @@ struct pen_renderer {
     struct scene *scenes[MAX_RESIDENT]; /* emission images too: scenes without geometry */
     uint32_t scene_count;
     struct emission_cache *emissions;
+    const struct pen_blobs *admitting; /* not evicted now */
 };
 
 const struct pen_catalogue *pen_renderer_catalogue(void)
@@ -64,9 +70,9 @@ struct pen_renderer *pen_renderer_create(
         free(r);
         return NULL;
     }
-    r->budget = config->gpu_memory_bytes ? config->gpu_memory_bytes : 1ull << 30;
+    r->budget = config->gpu_memory_bytes ? config->gpu_memory_bytes : DEFAULT_BUDGET;
     r->ctx.gpu_memory = r->budget;
-    r->ctx.shadow_memory = r->budget / 2;
+    r->ctx.shadow_memory = r->budget / 4;
     r->ctx.software = r->device.software;
     r->ctx.programs = gl_programs_create(config->programs);
     r->ctx.shadows = shadow_cache_create();
@@ -124,9 +130,29 @@ static uint64_t scene_bytes(const struct pen_renderer *r)
     return bytes;
 }
 
-uint64_t pen_renderer_gpu_bytes(const struct pen_renderer *r)
+static uint64_t cached_bytes(const struct pen_renderer *r)
 {
     return scene_bytes(r) + shadow_cache_bytes(r->ctx.shadows) + emission_cache_bytes(r->emissions);
+}
+
+uint64_t pen_renderer_gpu_bytes(const struct pen_renderer *r)
+{
+    uint64_t bytes = cached_bytes(r);
+    for (uint32_t i = 0; i < PEN_MAX_RENDERS; i++)
+        bytes += r->renders[i].target_bytes;
+    return bytes;
+}
+
+/* What is held, and what renders in progress will still take. */
+static uint64_t claimed_bytes(const struct pen_renderer *r)
+{
+    uint64_t bytes = cached_bytes(r);
+    for (uint32_t i = 0; i < PEN_MAX_RENDERS; i++) {
+        const struct pen_render *render = &r->renders[i];
+        bool more = render->lane.busy && render->need > render->target_bytes;
+        bytes += more ? render->need : render->target_bytes;
+    }
+    return bytes;
 }
 
 struct pen_program_counts pen_renderer_programs(const struct pen_renderer *r)
@@ -134,9 +160,12 @@ struct pen_program_counts pen_renderer_programs(const struct pen_renderer *r)
     return gl_programs_counts(r->ctx.programs);
 }
 
-/* A frame in progress reads it. */
+/* A frame in progress reads it, or one that is about to begin. */
 static bool is_used(const struct pen_renderer *r, const struct scene *scene)
 {
+    for (uint32_t i = 0; r->admitting && i < r->admitting->count; i++)
+        if (!memcmp(r->admitting->ids[i], scene->id, PEN_ID_BYTES))
+            return true;
     for (uint32_t i = 0; i < PEN_MAX_RENDERS; i++) {
         const struct lane *lane = &r->renders[i].lane;
         if (!lane->busy)
@@ -160,31 +189,58 @@ static void remove_scene(struct pen_renderer *r, uint32_t i)
     r->scenes[i] = r->scenes[--r->scene_count];
 }
 
-/* Frees least recently used scenes, never `keep`, until the budget holds. */
-static void evict(struct pen_renderer *r, const struct scene *keep)
+static bool is_any_busy(const struct pen_renderer *r)
+{
+    for (uint32_t i = 0; i < PEN_MAX_RENDERS; i++)
+        if (r->renders[i].lane.busy)
+            return true;
+    return false;
+}
+
+/* Frees something that can be made again, the cheapest first: targets that nobody draws into, shadow
+ * inputs, emission textures, scenes. False: all that is left is in use. */
+static bool evict(struct pen_renderer *r, uint64_t bytes, const struct scene *keep)
+{
+    uint64_t before = shadow_cache_bytes(r->ctx.shadows), least = UINT64_MAX;
+    for (uint32_t i = 0; i < PEN_MAX_RENDERS; i++)
+        if (!r->renders[i].lane.busy && r->renders[i].target_bytes) {
+            lane_finish(&r->renders[i].lane);
+            return true;
+        }
+    shadow_cache_trim(r->ctx.shadows, before > bytes ? before - bytes : 0);
+    if (shadow_cache_bytes(r->ctx.shadows) < before)
+        return true;
+    before = emission_cache_bytes(r->emissions);
+    if (before && !is_any_busy(r)) {
+        emission_cache_trim(r->emissions, 0);
+        return true;
+    }
+    uint32_t oldest = UINT32_MAX;
+    for (uint32_t i = 0; i < r->scene_count; i++)
+        if (r->scenes[i] != keep && r->scenes[i]->last_use < least && !is_used(r, r->scenes[i]))
+            least = r->scenes[i]->last_use, oldest = i;
+    if (oldest == UINT32_MAX)
+        return false;
+    remove_scene(r, oldest);
+    return true;
+}
+
+/* Evicts until the budget holds with so many bytes more. `keep` stays whatever happens. */
+static bool make_room(struct pen_renderer *r, uint64_t more, const struct scene *keep)
 {
     for (;;) {
-        uint64_t scenes = scene_bytes(r), least = UINT64_MAX;
-        /* Shadow inputs are cheaper to make again than scenes are to upload. */
-        shadow_cache_trim(r->ctx.shadows, r->budget > scenes ? r->budget - scenes : 0);
-        if (pen_renderer_gpu_bytes(r) <= r->budget && r->scene_count < MAX_RESIDENT)
-            return;
-        uint32_t oldest = UINT32_MAX;
-        for (uint32_t i = 0; i < r->scene_count; i++)
-            if (r->scenes[i] != keep && r->scenes[i]->last_use < least && !is_used(r, r->scenes[i]))
-                least = r->scenes[i]->last_use, oldest = i;
-        if (oldest == UINT32_MAX)
-            return;
-        remove_scene(r, oldest);
+        uint64_t bytes = claimed_bytes(r) + more;
+        if (bytes <= r->budget && r->scene_count < MAX_RESIDENT)
+            return true;
+        if (!evict(r, bytes > r->budget ? bytes - r->budget : 0, keep))
+            return false;
     }
 }
 
-static bool load(struct pen_renderer *r, const uint8_t id[PEN_ID_BYTES], struct scene *scene,
-    struct pen_error *error)
+static bool load(struct pen_renderer *r, struct scene *scene, struct pen_error *error)
 {
     if (!scene)
         return false;
-    (void)id;
     if (scene->bytes > r->budget) {
         pen_fail(error, PEN_TOO_BIG, "",
             "The scene needs %.0f MiB of GPU memory; %.0f MiB are allowed.",
@@ -194,14 +250,14 @@ static bool load(struct pen_renderer *r, const uint8_t id[PEN_ID_BYTES], struct 
     }
     scene->last_use = ++r->clock;
     r->scenes[r->scene_count++] = scene;
-    evict(r, scene);
+    make_room(r, 0, scene);
     return true;
 }
 
 bool pen_renderer_load_scene(
     struct pen_renderer *r, const uint8_t id[PEN_ID_BYTES], int fd, struct pen_error *error)
 {
-    return find_scene(r, id) || load(r, id, scene_create(id, fd, error), error);
+    return find_scene(r, id) || load(r, scene_create(id, fd, error), error);
 }
 
 bool pen_renderer_has_scene(const struct pen_renderer *r, const uint8_t id[PEN_ID_BYTES])
@@ -267,10 +323,82 @@ static struct pen_render *free_render(struct pen_renderer *r)
     return NULL;
 }
 
-bool pen_renderer_can_begin(struct pen_renderer *r, const struct pen_request *request)
+/* Of what a request needs, the bytes that are resident; of the others about what their files say. */
+static uint64_t blob_bytes(
+    const struct pen_renderer *r, const struct pen_blobs *blobs, bool resident)
+{
+    uint64_t bytes = 0;
+    for (uint32_t i = 0; i < blobs->count; i++) {
+        const struct scene *scene = find_scene(r, blobs->ids[i]);
+        struct stat status;
+        if ((scene != NULL) != resident)
+            continue;
+        if (scene)
+            bytes += scene->bytes;
+        else if (!fstat(blobs->fds[i], &status))
+            bytes += (uint64_t)status.st_size;
+    }
+    return bytes;
+}
+
+static uint64_t picture_bytes(const struct pen_renderer *r, const struct pen_request *request)
+{
+    uint32_t lights = request->light_count;
+    const struct scene *scene = find_scene(r, request->scene);
+    if (!request->lights_given && scene)
+        lights =
+            scene->blob.light_count < PEN_MAX_LIGHTS ? scene->blob.light_count : PEN_MAX_LIGHTS;
+    return frame_output_estimate(request, lights);
+}
+
+static bool load_blobs(
+    struct pen_renderer *r, const struct pen_blobs *blobs, struct pen_error *error)
+{
+    for (uint32_t i = 0; i < blobs->count; i++) {
+        struct scene *scene = find_scene(r, blobs->ids[i]);
+        if (scene)
+            scene->last_use = ++r->clock;
+        else if (!pen_renderer_load_scene(r, blobs->ids[i], blobs->fds[i], error))
+            return false;
+    }
+    return true;
+}
+
+enum pen_admission pen_renderer_admit(struct pen_renderer *r, const struct pen_request *request,
+    const struct pen_blobs *blobs, struct pen_error *error)
 {
     struct scene *scene = find_scene(r, request->scene);
-    return free_render(r) && (!scene || can_pose(r, scene, request));
+    bool alone = !is_any_busy(r);
+    enum pen_admission admission = PEN_LATER;
+    if (!free_render(r) || (scene && !can_pose(r, scene, request)))
+        return PEN_LATER;
+    r->admitting = blobs;
+    /* Nothing is loaded in vain while others are there. */
+    uint64_t more = blob_bytes(r, blobs, false) + picture_bytes(r, request);
+    if (!alone && !make_room(r, more, NULL))
+        goto done;
+    if (!load_blobs(r, blobs, error)) {
+        admission = PEN_REFUSED;
+        goto done;
+    }
+    uint64_t picture = picture_bytes(r, request);
+    if (make_room(r, picture, NULL)) {
+        admission = PEN_ADMITTED;
+    } else if (alone) {
+        pen_fail(error, PEN_TOO_BIG, "",
+            "The scene needs %.0f MiB of GPU memory with its images, a picture of this size, with "
+            "these lights and layers about %.0f MiB; %.0f MiB are allowed. Ask for fewer pixels, "
+            "or "
+            "have --gpu-memory raised.",
+            (double)blob_bytes(r, blobs, true) / (1 << 20), (double)picture / (1 << 20),
+            (double)r->budget / (1 << 20));
+        admission = PEN_REFUSED;
+    }
+done:
+    r->admitting = NULL;
+    if (admission != PEN_ADMITTED)
+        make_room(r, 0, NULL);
+    return admission;
 }
 
 struct pen_render *pen_render_begin(struct pen_renderer *r, const struct pen_request *request,
@@ -307,6 +435,7 @@ struct pen_render *pen_render_begin(struct pen_renderer *r, const struct pen_req
         .emissions = r->emissions,
         .find_image = find_image,
         .owner = r};
+    render->need = picture_bytes(r, request);
     lane_begin(lane, frame, result);
     return render;
 fail:
@@ -322,7 +451,10 @@ void pen_render_watch(struct pen_render *render, const struct pen_viewer *viewer
 
 bool pen_render_advance(struct pen_render *render, double ms)
 {
-    return lane_advance(&render->lane, ms);
+    gl_targets_charge(&render->target_bytes);
+    bool ended = lane_advance(&render->lane, ms);
+    gl_targets_charge(NULL);
+    return ended;
 }
 
 bool pen_render_end(struct pen_render *render, struct pen_error *error)
@@ -330,39 +462,37 @@ bool pen_render_end(struct pen_render *render, struct pen_error *error)
     struct pen_renderer *r = render->renderer;
     struct lane *lane = &render->lane;
     struct pen_result *result = lane->result;
+    struct pen_frame *frame = lane->frame;
     bool cancelled = !lane->ended;
     if (cancelled)
         lane_cancel(lane);
-    if (cancelled || lane->error.code == PEN_LOST)
-        lane->ok = false;
+    struct pen_error failure = lane->error;
+    bool ok = lane->ok && !cancelled && failure.code != PEN_LOST;
     lane->busy = false;
     shadow_cache_end_frame(&lane->ctx);
-    uint64_t since = UINT64_MAX;
-    bool alone = true;
+    uint64_t since = lane->programs_since;
     for (uint32_t i = 0; i < PEN_MAX_RENDERS; i++) {
         const struct lane *other = &r->renders[i].lane;
-        alone = alone && !other->busy;
         if (other->busy && other->programs_since < since)
             since = other->programs_since;
     }
-    evict(r, lane->job.scene);
-    if (alone)
+    gl_programs_end_frame(r->ctx.programs, since);
+    if (!is_any_busy(r))
         emission_cache_trim(r->emissions, EMISSION_BYTES);
-    gl_programs_end_frame(
-        r->ctx.programs, since < lane->programs_since ? since : lane->programs_since);
+    make_room(r, 0, lane->job.scene); /* what the lane keeps may go, too */
     result->gpu_bytes = pen_renderer_gpu_bytes(r);
     result->programs = gl_programs_counts(r->ctx.programs);
     GLenum gl_error = gl.GetError();
-    if (lane->ok && gl_error == GL_NO_ERROR)
+    if (ok && gl_error == GL_NO_ERROR)
         return true;
     if (gl_error == GL_CONTEXT_LOST || gl_error == GL_OUT_OF_MEMORY)
         r->lost = true;
-    if (lane->ok)
-        pen_fail(&lane->error, PEN_INTERNAL, "", "OpenGL reported error 0x%04x.", gl_error);
-    pen_frame_finish(lane->frame);
-    result->error = lane->error;
+    if (ok)
+        pen_fail(&failure, PEN_INTERNAL, "", "OpenGL reported error 0x%04x.", gl_error);
+    pen_frame_finish(frame);
+    result->error = failure;
     if (error)
-        *error = lane->error;
+        *error = failure;
     return false;
 }
 
@@ -395,7 +525,7 @@ static void warm_scene(struct pen_renderer *r, uint32_t kind)
     uint8_t id[PEN_ID_BYTES] = {'w', 'a', 'r', 'm', (uint8_t)kind};
     if (!pen_generate_blob(&options, &data, &bytes, NULL))
         return;
-    if (load(r, id, scene_create_memory(id, data, bytes, NULL), NULL)) {
+    if (load(r, scene_create_memory(id, data, bytes, NULL), NULL)) {
         const struct pen_catalogue *catalogue = pen_renderer_catalogue();
         for (uint32_t i = 0; i < catalogue->count; i++) {
             struct pen_request request;

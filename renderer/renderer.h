@@ -10,7 +10,7 @@ struct pen_renderer;
 
 struct pen_renderer_config {
     struct pen_device_config device;
-    uint64_t gpu_memory_bytes; /* budget for scenes, images and shadow inputs; 0: 1 GiB */
+    uint64_t gpu_memory_bytes; /* budget for scenes, images, shadow inputs and targets; 0: 2 GiB */
     uint32_t programs;         /* most compiled programs kept between frames; 0: 256 */
 };
 
@@ -46,8 +46,22 @@ bool pen_renderer_render(struct pen_renderer *renderer, const struct pen_request
  * end. `frame` and `result` are filled at the end. */
 #define PEN_MAX_RENDERS 4
 struct pen_render;
-/* There is room for it, and its scene is in use in no other pose. */
-bool pen_renderer_can_begin(struct pen_renderer *renderer, const struct pen_request *request);
+/* The blobs that a request needs: the scene's, then those of its images. */
+struct pen_blobs {
+    uint32_t count;
+    const uint8_t *ids[1 + PEN_MAX_LIGHTS];
+    int fds[1 + PEN_MAX_LIGHTS];
+};
+enum pen_admission {
+    PEN_REFUSED, /* the error says why */
+    PEN_LATER,   /* when something that is in progress has ended */
+    PEN_ADMITTED /* may begin, now */
+};
+/* Makes resident what a request needs, all of it at once, beside what renders in progress use, and
+ * sees to the room that its picture takes. LATER: the memory, a lane or the scene (in another pose)
+ * is in use. Errors: as pen_renderer_load_scene; PEN_TOO_BIG: it would not fit alone. */
+enum pen_admission pen_renderer_admit(struct pen_renderer *renderer,
+    const struct pen_request *request, const struct pen_blobs *blobs, struct pen_error *error);
 /* NULL, with the error filled, when it cannot even begin. */
 struct pen_render *pen_render_begin(struct pen_renderer *renderer,
     const struct pen_request *request, struct pen_frame *frame, struct pen_result *result,

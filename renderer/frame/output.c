@@ -2,6 +2,7 @@
 #include "renderer/frame/edges.h"
 #include "protocol/memory.h"
 #include "renderer/frame/layers.h"
+#include "renderer/frame/needs.h"
 #include "renderer/passes/draw/screen.h"
 #include <math.h>
 #include <stdio.h>
@@ -166,4 +167,21 @@ bool frame_output_read(const struct frame_job *job, const struct view *view, uin
         read_plane(job, pixel, layer, frame);
     }
     return true;
+}
+
+/* Bytes per pixel: the G-buffer without emission; what most methods have of their own at some time. */
+#define GBUFFER_BYTES 20
+#define METHOD_BYTES 16
+
+uint64_t frame_output_estimate(const struct pen_request *r, uint32_t lights)
+{
+    bool direct = frame_output_is_direct(r);
+    uint64_t bytes = GBUFFER_BYTES + METHOD_BYTES + 8ull * (lights ? lights : 1) +
+                     (r->output.format == PEN_EXR || r->output.bit_depth == 16 ? 16 : 4) +
+                     (direct ? 4 : 0);
+    bytes += !direct && frame_needs(r, PEN_SOURCE_BEAUTY) ? 16 : 0;
+    bytes += frame_needs(r, PEN_SOURCE_VISIBILITY) ? 16 : 0;
+    bytes += frame_needs(r, PEN_SOURCE_CLASSES) ? 4 : 0;
+    bytes += frame_needs(r, PEN_SOURCE_VARIANCE) ? 4 : 0;
+    return bytes * r->width * r->height;
 }

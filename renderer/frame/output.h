@@ -6,6 +6,9 @@
 /* True when one 8-bit beauty image of one frame is all that is wanted: shading then resolves. */
 bool frame_output_is_direct(const struct pen_request *request);
 
+/* About what all targets of a picture will take, bytes, with what methods commonly add. */
+uint64_t frame_output_estimate(const struct pen_request *request, uint32_t lights);
+
 /* Makes targets->color (and its framebuffer) fit the output. */
 void frame_output_fit(struct frame_targets *targets, const struct pen_request *request);
 /* `frames`: how many jittered ones are in it. */

@@ -247,17 +247,40 @@ static struct waiter *sift(struct waiter *list, uint32_t *gone_count)
     return kept;
 }
 
-static uint64_t pixels_of(const struct render *render)
+#define MOST_BARRED 16
+
+/* Scenes of which an older render waits. */
+struct barred {
+    uint32_t count;
+    const uint8_t *scenes[MOST_BARRED];
+};
+
+static bool is_barred(const struct barred *barred, const struct render *render)
 {
-    return (uint64_t)render->request.width * render->request.height;
+    for (uint32_t i = 0; i < barred->count; i++)
+        if (!memcmp(barred->scenes[i], render->request.scene, PEN_ID_BYTES))
+            return true;
+    return false;
 }
 
-/* The first of a queue that is not too large; NULL: none. */
-static struct render *first_fit(const struct scheduler *s, bool batch, uint64_t most_pixels)
+/* The first of a queue that fits; NULL: none. *nothing: nor may any other be taken. */
+static struct render *first_fit(
+    const struct scheduler *s, bool batch, const struct taker *taker, bool *nothing)
 {
+    struct barred barred = {0};
     struct render *render = s->queue[batch][0];
-    while (render && pixels_of(render) > most_pixels)
-        render = render->next;
+    for (; render; render = render->next) {
+        if (is_barred(&barred, render))
+            continue;
+        enum take take = taker->fits(taker->context, render);
+        if (take == TAKE_FITS)
+            break;
+        *nothing |= take == TAKE_NOTHING;
+        if (*nothing)
+            return NULL;
+        if (take == TAKE_SCENE_LATER && barred.count < MOST_BARRED)
+            barred.scenes[barred.count++] = render->request.scene;
+    }
     return render;
 }
 
@@ -281,12 +304,20 @@ static bool keep_wanted(struct scheduler *s, struct render *render)
     return render->waiters != NULL;
 }
 
-struct render *scheduler_take(struct scheduler *s, uint64_t most_pixels)
+/* Those before it that did not fit have been passed. */
+static void count_passed(struct scheduler *s, const struct render *taken)
+{
+    for (struct render *r = s->queue[taken->batch][0]; r != taken; r = r->next)
+        r->passed++;
+}
+
+struct render *scheduler_take(struct scheduler *s, const struct taker *taker)
 {
     for (;;) {
         pthread_mutex_lock(&s->lock);
-        struct render *interactive = first_fit(s, false, most_pixels);
-        struct render *batch = first_fit(s, true, most_pixels);
+        bool nothing = false;
+        struct render *interactive = first_fit(s, false, taker, &nothing);
+        struct render *batch = nothing ? NULL : first_fit(s, true, taker, &nothing);
         bool turn = s->turn % BATCH_TURN == BATCH_TURN - 1;
         struct render *render = batch && (!interactive || turn) ? batch : interactive;
         if (!render) {
@@ -294,6 +325,7 @@ struct render *scheduler_take(struct scheduler *s, uint64_t most_pixels)
             return NULL;
         }
         s->turn++;
+        count_passed(s, render);
         unlink_queued(s, render);
         render->running = true;
         render->taken_ns = clock_now_ns();

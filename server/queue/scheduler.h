@@ -42,6 +42,10 @@ struct render {
     int reference_fd;         /* the render's own; 0: none */
     uint32_t attempts, kills; /* kept by the worker pool */
     uint64_t client;          /* of the one who asked first */
+    uint32_t passed;          /* how often one behind it was taken while it could not be */
+    /* Of a worker that had no room for it: which, and how many renders had ended there. */
+    uint32_t busy_worker;
+    uint64_t busy_ended;
 };
 
 struct scheduler_limits {
@@ -61,10 +65,20 @@ bool scheduler_submit(struct scheduler *scheduler, const struct pen_request *req
     struct pen_error *error);
 void scheduler_release(struct scheduler *scheduler, uint64_t client);
 
-/* The next render of at most so many pixels that somebody still waits for, interactive before batch;
- * NULL: none. The caller gives it back with scheduler_return (to be taken again, first) or
- * scheduler_finish. */
-struct render *scheduler_take(struct scheduler *scheduler, uint64_t most_pixels);
+/* Whether a worker can take a render now. */
+enum take {
+    TAKE_FITS,
+    TAKE_LATER,       /* others may go before it */
+    TAKE_SCENE_LATER, /* others may, but none of its scene */
+    TAKE_NOTHING      /* it has been passed too often: what is there is kept for it */
+};
+struct taker {
+    enum take (*fits)(void *context, struct render *render); /* called with the lock held */
+    void *context;
+};
+/* The next render that fits and that somebody still waits for, interactive before batch; NULL: none.
+ * The caller gives it back with scheduler_return (to be taken again, first) or scheduler_finish. */
+struct render *scheduler_take(struct scheduler *scheduler, const struct taker *taker);
 /* Of one that was taken: somebody still waits for it. Once not, nobody can join it any more. */
 bool scheduler_is_wanted(struct scheduler *scheduler, struct render *render);
 void scheduler_return(struct scheduler *scheduler, struct render *render);

@@ -18,6 +18,7 @@ enum channel_kind {
     CHANNEL_REFUSED,   /* worker: there is no such device; it then exits */
     CHANNEL_WARM,      /* worker: warmed up */
     CHANNEL_STARTED,   /* worker: the GL thread takes this job */
+    CHANNEL_BUSY,      /* worker: there is no room for this job beside what is in progress */
     CHANNEL_TURN,      /* worker: it is alive, and from now on this job has its turns */
     CHANNEL_RENDERED,  /* worker: the GL thread is done with it, encoding follows */
     CHANNEL_PART,      /* worker: the picture so far, as CHANNEL_DONE has it; the job goes on */

@@ -16,22 +16,14 @@
 #include <unistd.h>
 
 #define IDLE_BEFORE_WARM_UP_MS 10000 /* a replacement has work to catch up with first */
-#define MAX_WAITING CHANNEL_MAX_JOBS
 #define TELL_TURN_MS 250
 #define EXIT_REFUSED 2
 #define EXIT_LOST 3
 #define EXIT_PROTOCOL 4
 
-struct waiting {
-    struct channel_message message;
-    struct channel_fds fds;
-};
-
 struct worker {
     struct pen_renderer *renderer;
     struct worker_turns *turns;
-    struct waiting waiting[MAX_WAITING]; /* for room, in the order of arrival */
-    uint32_t waiting_count;
     uint64_t told_job, told_ns; /* whose turn it is, as told last */
     struct worker_encoder *encoder;
     enum worker_warm_up warm_up;      /* what is still to be done */
@@ -79,22 +71,15 @@ static void tell_resident(struct worker *worker, const uint8_t *used)
     send_or_exit(&message);
 }
 
-/* Makes the scene and the emission images resident, all at once. */
-static bool load(struct worker *worker, const struct channel_job *job,
-    const struct channel_fds *fds, struct pen_error *error)
+static enum pen_admission admit(struct worker *worker, const struct channel_job *job,
+    const struct pen_request *request, const struct channel_fds *fds, struct pen_error *error)
 {
-    struct pen_renderer *renderer = worker->renderer;
-    uint32_t count = job->image_count < PEN_MAX_LIGHTS ? job->image_count : PEN_MAX_LIGHTS;
-    bool ok = pen_renderer_load_scene(renderer, job->request.scene, fds->fd[0], error);
-    for (uint32_t i = 0; ok && i < count; i++)
-        ok = pen_renderer_load_image(renderer, job->images[i], fds->fd[1 + i], error);
-    bool all = ok && pen_renderer_has_scene(renderer, job->request.scene);
-    for (uint32_t i = 0; all && i < count; i++)
-        all = pen_renderer_has_image(renderer, job->images[i]);
-    if (ok && !all)
-        pen_fail(error, PEN_TOO_BIG, "",
-            "The scene and its emission images do not fit into GPU memory together.");
-    return all;
+    struct pen_blobs blobs = {.count = 1 + job->image_count};
+    for (uint32_t i = 0; i < blobs.count; i++) {
+        blobs.ids[i] = i ? job->images[i - 1] : job->request.scene;
+        blobs.fds[i] = fds->fd[i];
+    }
+    return pen_renderer_admit(worker->renderer, request, &blobs, error);
 }
 
 static struct worker_item *make_item(const struct channel_message *message)
@@ -148,12 +133,13 @@ static bool hand_over(struct worker *worker, struct worker_item *item)
     return true;
 }
 
-/* As hand_over. */
-static bool begin_job(
+/* Begins a job, or gives it back when there is no room for it now. As hand_over. */
+static bool take_job(
     struct worker *worker, const struct channel_message *message, const struct channel_fds *fds)
 {
     const struct channel_job *job = &message->job_data;
     send_or_exit(&(struct channel_message){CHANNEL_VERSION, CHANNEL_STARTED, message->job});
+    worker->told_job = 0; /* whose turn it then is has to be told */
     struct worker_item *item = make_item(message);
     struct pen_error *error = &item->message.result.error;
     bool compares = measure_has_reference(job->measure);
@@ -164,73 +150,31 @@ static bool begin_job(
     ok = ok && pen_request_check(&job->request, pen_renderer_catalogue(), error);
     item->was_resident = ok && pen_renderer_has_scene(worker->renderer, job->request.scene);
     uint64_t start = clock_now_ns();
-    ok = ok && load(worker, job, fds, error);
-    item->load_ms = (float)clock_ms(clock_now_ns() - start);
     struct pen_request request = job->request;
-    if (ok && job->measure != MEASURE_PICTURE) {
+    if (job->measure != MEASURE_PICTURE)
         worker_measure_output(&request.output);
-        pen_renderer_drop_shadows(worker->renderer);
+    enum pen_admission admission = ok ? admit(worker, job, &request, fds, error) : PEN_REFUSED;
+    if (admission == PEN_LATER) {
+        free(item);
+        tell_resident(worker, NULL);
+        send_or_exit(&(struct channel_message){CHANNEL_VERSION, CHANNEL_BUSY, message->job});
+        return true;
     }
+    ok = admission == PEN_ADMITTED;
+    item->load_ms = (float)clock_ms(clock_now_ns() - start);
+    if (ok && job->measure != MEASURE_PICTURE)
+        pen_renderer_drop_shadows(worker->renderer);
     if (ok && compares)
         item->reference_fd = fcntl(fds->fd[1 + job->image_count], F_DUPFD_CLOEXEC, 3);
     return (ok && worker_turns_begin(worker->turns, &request, job->client, item)) ||
            hand_over(worker, item);
 }
 
-/* Begins it, or keeps it until there is room. */
-static bool take_job(
-    struct worker *worker, const struct channel_message *message, struct channel_fds *fds)
-{
-    if (!worker->waiting_count && worker_turns_have_room(worker->turns, &message->job_data.request))
-        return begin_job(worker, message, fds);
-    if (worker->waiting_count == MAX_WAITING)
-        _exit(EXIT_PROTOCOL); /* the daemon never sends so many */
-    struct waiting *waiting = &worker->waiting[worker->waiting_count++];
-    waiting->message = *message;
-    waiting->fds = *fds;
-    fds->count = 0; /* they are kept */
-    return true;
-}
-
-static void forget_waiting(struct worker *worker, uint32_t i)
-{
-    channel_close_fds(&worker->waiting[i].fds);
-    worker->waiting_count--;
-    memmove(&worker->waiting[i], &worker->waiting[i + 1],
-        (worker->waiting_count - i) * sizeof *worker->waiting);
-}
-
-/* Begins what waited for room, in order. */
-static bool begin_waiting(struct worker *worker)
-{
-    bool alive = true;
-    while (alive && worker->waiting_count &&
-           worker_turns_have_room(worker->turns, &worker->waiting[0].message.job_data.request)) {
-        alive = begin_job(worker, &worker->waiting[0].message, &worker->waiting[0].fds);
-        forget_waiting(worker, 0);
-    }
-    return alive;
-}
-
 /* A job that is being encoded is not stopped any more. */
 static bool cancel_job(struct worker *worker, uint64_t job)
 {
     struct worker_item *item = worker_turns_cancel(worker->turns, job);
-    for (uint32_t i = 0; !item && i < worker->waiting_count; i++)
-        if (worker->waiting[i].message.job == job) {
-            item = make_item(&worker->waiting[i].message);
-            pen_fail(&item->message.result.error, PEN_LOST, "", "Nobody waits for it.");
-            forget_waiting(worker, i);
-        }
     return !item || hand_over(worker, item);
-}
-
-static void want_part(struct worker *worker, uint64_t job)
-{
-    worker_turns_want(worker->turns, job);
-    for (uint32_t i = 0; i < worker->waiting_count; i++)
-        if (worker->waiting[i].message.job == job)
-            worker->waiting[i].message.job_data.parts = 1;
 }
 
 /* Tells the daemon whose turn it is: when that changes, and now and then as a sign of life. */
@@ -247,8 +191,6 @@ static void tell_turn(struct worker *worker, uint64_t job)
 /* One turn of whoever is next. */
 static bool run_turn(struct worker *worker)
 {
-    if (!begin_waiting(worker))
-        return false;
     uint64_t job = worker_turns_next(worker->turns);
     if (!job)
         return true;
@@ -272,7 +214,7 @@ static bool take_message(
     case CHANNEL_CANCEL:
         return cancel_job(worker, message->job);
     case CHANNEL_WANT:
-        want_part(worker, message->job);
+        worker_turns_want(worker->turns, message->job);
         return true;
     case CHANNEL_DROP:
         drop(worker, message->drop.scene);
@@ -288,7 +230,7 @@ static int serve(struct worker *worker)
     static struct channel_message message;
     struct channel_fds fds;
     for (;;) {
-        bool busy = worker_turns_next(worker->turns) || worker->waiting_count;
+        bool busy = worker_turns_next(worker->turns) != 0;
         struct pollfd watch = {CHANNEL_WORKER_FD, POLLIN, 0};
         int n = poll(&watch, 1,
             busy                                     ? 0

@@ -17,9 +17,6 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-/* A render holds its targets while others have their turns: beside one of any size, the others may
- * have so many pixels together. */
-#define PIXELS_BESIDE (8u << 20)
 #define WANTED_EVERY_MS 10 /* how often it is asked whether anybody still waits for what runs */
 #define MAX_KILLS 2        /* of one render, by its own fault */
 #define MAX_ATTEMPTS 6     /* of one render, when somebody else ends the workers */
@@ -187,30 +184,6 @@ static bool dispatch(struct slot *slot, struct flight *flight, struct render *re
     return ok;
 }
 
-/* Pixels that another render may have; 0: there is no place for one. */
-static uint64_t room(const struct slot *slot)
-{
-    uint64_t sum = 0, largest = 0;
-    uint32_t count = 0;
-    for (int i = 0; i < IN_FLIGHT; i++) {
-        const struct flight *flight = &slot->flights[i];
-        if (!flight->render || flight->phase == PHASE_ENCODING)
-            continue;
-        const struct pen_request *r = &flight->render->request;
-        uint64_t pixels = (uint64_t)r->width * r->height;
-        largest = pixels > largest ? pixels : largest;
-        sum += pixels;
-        count++;
-    }
-    if (count == IN_TURNS)
-        return 0;
-    uint64_t others = sum - largest;
-    /* The new one may become the largest when what is there now fits beside it. */
-    if (sum <= PIXELS_BESIDE)
-        return UINT64_MAX;
-    return others < PIXELS_BESIDE ? PIXELS_BESIDE - others : 0;
-}
-
 static bool feed(struct slot *slot)
 {
     struct worker_pool *pool = slot->pool;
@@ -228,9 +201,8 @@ static bool feed(struct slot *slot)
     }
     for (int i = 0; i < IN_FLIGHT; i++) {
         while (!slot->flights[i].render) {
-            uint64_t most_pixels = room(slot);
             struct render *render =
-                most_pixels ? scheduler_take(pool->config.scheduler, most_pixels) : NULL;
+                scheduler_take(pool->config.scheduler, &(struct taker){worker_slot_fits, slot});
             if (!render)
                 return true;
             if (!dispatch(slot, &slot->flights[i], render))

@@ -3,6 +3,11 @@
 #include "server/base/log.h"
 #include "server/workers/measured.h"
 #include <poll.h>
+#include <string.h>
+
+/* One that finds no room is passed so often before others wait for it, and they do so for so long. */
+#define MOST_PASSED 8
+#define KEPT_FREE_NS (10 * CLOCK_S)
 
 void worker_slot_finish(struct slot *slot, struct flight *flight, const struct outcome *outcome)
 {
@@ -119,6 +124,65 @@ static void on_done(
     measured_release(&outcome);
 }
 
+static bool is_in_turns(const struct flight *flight)
+{
+    return flight->render && flight->phase != PHASE_ENCODING;
+}
+
+/* The scene cannot be in two poses, or dressed in two ways, at a time. */
+static bool is_posed_alike(const struct pen_request *a, const struct pen_request *b)
+{
+    return a->time_s == b->time_s && !strcmp(a->animation, b->animation) &&
+           !strcmp(a->variant, b->variant);
+}
+
+/* One that would have fitted if others had not gone before it. */
+static enum take pass(struct slot *slot, struct render *render)
+{
+    if (render->passed < MOST_PASSED)
+        return TAKE_LATER;
+    uint64_t now = clock_now_ns();
+    if (slot->kept_free_for != render->id) {
+        slot->kept_free_for = render->id;
+        slot->kept_free_ns = now;
+    }
+    if (now - slot->kept_free_ns < KEPT_FREE_NS)
+        return TAKE_NOTHING;
+    slot->kept_free_for = 0; /* what is in the way takes long: that is not for others to bear */
+    render->passed = 0;
+    return TAKE_LATER;
+}
+
+enum take worker_slot_fits(void *context, struct render *render)
+{
+    struct slot *slot = context;
+    uint32_t count = 0;
+    for (int i = 0; i < IN_FLIGHT; i++) {
+        if (!is_in_turns(&slot->flights[i]))
+            continue;
+        const struct pen_request *other = &slot->flights[i].render->request;
+        if (!memcmp(other->scene, render->request.scene, PEN_ID_BYTES) &&
+            !is_posed_alike(other, &render->request))
+            return TAKE_SCENE_LATER;
+        count++;
+    }
+    if (count == IN_TURNS)
+        return TAKE_NOTHING;
+    bool was_busy = count && render->busy_worker == slot->index + 1;
+    return was_busy && render->busy_ended == slot->ended ? pass(slot, render) : TAKE_FITS;
+}
+
+/* There was no room for it: it goes back, until something has ended. */
+static void on_busy(struct slot *slot, struct flight *flight)
+{
+    struct render *render = flight->render;
+    render->busy_worker = slot->index + 1;
+    render->busy_ended = slot->ended;
+    flight->render = NULL;
+    slot->turn_job = 0;
+    scheduler_return(slot->pool->config.scheduler, render);
+}
+
 /* False when the worker is to be buried. */
 static bool on_message(
     struct slot *slot, const struct channel_message *message, const struct channel_fds *fds)
@@ -139,8 +203,13 @@ static bool on_message(
     case CHANNEL_TURN:
         slot->turn_job = message->job;
         return true;
+    case CHANNEL_BUSY:
+        if (flight)
+            on_busy(slot, flight);
+        return true;
     case CHANNEL_STARTED:
     case CHANNEL_RENDERED:
+        slot->ended += message->kind == CHANNEL_RENDERED;
         slot->turn_job = message->kind == CHANNEL_STARTED ? message->job : 0;
         if (flight) {
             flight->phase = message->kind == CHANNEL_STARTED ? PHASE_RENDERING : PHASE_ENCODING;

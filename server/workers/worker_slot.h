@@ -38,6 +38,9 @@ struct slot {
     uint64_t spawned_ns, died_ns, heard_ns; /* heard: the last sign of life */
     uint32_t failures;                      /* in a row, before a hello */
     struct flight flights[IN_FLIGHT];
+    uint64_t ended;         /* renders that have left the turns, one way or the other */
+    uint64_t kept_free_for; /* the render that waits for room; 0: none */
+    uint64_t kept_free_ns;  /* since when */
 };
 
 struct worker_pool {
@@ -52,5 +55,7 @@ struct worker_pool {
 struct flight *worker_slot_find(struct slot *slot, uint64_t job); /* NULL: it is not in flight */
 /* Answers whoever waits for the flight's render; its place is free then. */
 void worker_slot_finish(struct slot *slot, struct flight *flight, const struct outcome *outcome);
+/* Whether the worker can take it beside what it has: struct taker.fits of a slot. */
+enum take worker_slot_fits(void *slot, struct render *render);
 /* Reads everything that the worker has said; false when it is to be buried. */
 bool worker_slot_hear(struct slot *slot);

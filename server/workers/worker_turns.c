@@ -90,11 +90,6 @@ void worker_turns_destroy(struct worker_turns *t)
     free(t);
 }
 
-bool worker_turns_have_room(const struct worker_turns *t, const struct pen_request *request)
-{
-    return pen_renderer_can_begin(t->renderer, request);
-}
-
 /* The client's account; made of the one that was unused for longest when there is none. */
 static struct client *account(struct worker_turns *t, uint64_t id)
 {

@@ -13,9 +13,7 @@ struct worker_turns *worker_turns_create(struct pen_renderer *renderer,
     void (*on_part)(void *context, struct worker_item *part), void *context);
 void worker_turns_destroy(struct worker_turns *turns); /* gives up what is in progress */
 
-/* There is a place for it, and its scene is in use in no other pose. */
-bool worker_turns_have_room(const struct worker_turns *turns, const struct pen_request *request);
-/* Begins a render whose scene and images are resident; `client` 0 is one of its own. The item stays
+/* Begins a render that was admitted; `client` 0 is one of its own. The item stays
  * with the turns until they give it back, unless this fails with item->message.result.error. */
 bool worker_turns_begin(struct worker_turns *turns, const struct pen_request *request,
     uint64_t client, struct worker_item *item);

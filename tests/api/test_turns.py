@@ -1,13 +1,15 @@
 """One slow render stops nobody: others come in between, and a render that nobody waits for ends."""
+import hashlib
 import http.client
 import json
 import os
 import random
+import struct
 import threading
 import unittest
 
 import harness
-from harness import SMALL, Daemon, grid_scene, wait
+from harness import SMALL, Daemon, glb, grid_scene, png, wait
 
 # Takes much longer than everything else here together.
 ENDLESS = {"technique": {"name": "multisample", "params": {"samples": 1024}}, "antialias": 64,
@@ -18,6 +20,24 @@ SAMPLED = [dict(ENDLESS, technique={"name": name, "params": params}) for name, p
     ("pcss", {}), ("cascaded", {}))]
 
 
+def moving_scene():
+    """A triangle that rises by 0.5 m in a second."""
+    data = struct.pack("<9f3H2x2f6f", -0.5, 0, 0, 0.5, 0, 0, 0, 1, 0, 0, 1, 2, 0, 1, 0, 0, 0, 0, 0.5, 0)
+    views = [(0, 36), (36, 6), (44, 8), (52, 24)]
+    accessor = lambda view, kind, count, shape, **more: dict(
+        bufferView=view, componentType=kind, count=count, type=shape, **more)
+    return glb({
+        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+        "accessors": [accessor(0, 5126, 3, "VEC3", min=[-0.5, 0, 0], max=[0.5, 1, 0]),
+                      accessor(1, 5123, 3, "SCALAR"),
+                      accessor(2, 5126, 2, "SCALAR", min=[0], max=[1]), accessor(3, 5126, 2, "VEC3")],
+        "animations": [{"samplers": [{"input": 2, "output": 3}],
+                        "channels": [{"sampler": 0, "target": {"node": 0, "path": "translation"}}]}],
+        "bufferViews": [{"buffer": 0, "byteOffset": at, "byteLength": size} for at, size in views],
+        "buffers": [{"byteLength": len(data)}]}, data)
+
+
 class Turns(unittest.TestCase):
     def setUp(self):
         self.d = Daemon("--client-share=0")
@@ -26,10 +46,10 @@ class Turns(unittest.TestCase):
         self.small = self.d.render(self.scene, SMALL)
         self.assertEqual(self.small.status, 200)
 
-    def begin(self, request):
+    def begin(self, request, scene=None):
         """Sends a request without waiting for its answer."""
         connection = http.client.HTTPConnection("127.0.0.1", self.d.port)
-        connection.request("POST", "/v1/scenes/%s/render" % self.scene, json.dumps(request),
+        connection.request("POST", "/v1/scenes/%s/render" % (scene or self.scene), json.dumps(request),
                            {"Content-Type": "application/json", "Cache-Control": "no-cache"})
         self.addCleanup(connection.close)
         return connection
@@ -119,6 +139,63 @@ class Turns(unittest.TestCase):
                 self.assertLessEqual(now, before)
             before = now
         self.check_nothing_happened()
+
+    def later(self, request, scene=None):
+        """A request whose answer comes into the list."""
+        answers = []
+        thread = threading.Thread(target=lambda: answers.append(
+            self.d.render(scene or self.scene, request)))
+        thread.start()
+        return thread, answers
+
+    def test_a_scene_in_two_poses_waits_its_turn(self):
+        scene = self.d.upload(moving_scene())
+        pose = lambda time, request=SMALL: dict(request, animation="0", time_s=time)
+        still = self.d.render(scene, pose(1))
+        self.assertEqual(still.status, 200, still.body)
+        long = self.begin(pose(0, ENDLESS), scene)
+        wait(lambda: self.running() == 1)
+        thread, answers = self.later(pose(1), scene)
+        wait(lambda: self.d.metric("penumbra_queue_depth") == 1)
+        for _ in range(harness.IN_TURNS + 2):  # others do not wait for it
+            self.assertEqual(self.d.render(self.scene, SMALL).body, self.small.body)
+        self.assertEqual((answers, self.d.metric("penumbra_queue_depth")), ([], 1))
+        long.close()
+        thread.join()
+        self.assertEqual((answers[0].status, answers[0].body), (200, still.body))
+        self.check_nothing_happened()
+
+    def test_what_others_hold_is_waited_for(self):
+        """With little GPU memory a scene and an image do not fit beside a scene in use, but alone."""
+        big, other = grid_scene(200, "a"), grid_scene(200, "b")
+        size = self.d.get("/v1/scenes/" + self.d.upload(big)).json()["gpu_bytes"]
+        self.d.kill()
+        picture = png(1024, 1024)
+        image = hashlib.sha256(picture).hexdigest()
+        self.d = Daemon("--client-share=0", "--gpu-memory=%d" % (2 * size + (3 << 20)))
+        self.addCleanup(self.d.kill)
+        big, other = self.d.upload(big), self.d.upload(other)
+        answer = self.d.call("PUT", "/v1/images/" + image, picture, {"Content-Type": "image/png"})
+        self.assertIn(answer.status, (200, 201), answer.body)
+        lit = dict(SMALL, lights=[{"type": "rect", "position": [0, 2, 0.1], "target": [0, 0, 0],
+                                   "width": 1, "height": 1, "texture": {"image": image}}])
+        alone = self.d.render(other, lit)
+        self.assertEqual(alone.status, 200, alone.body)
+        long = self.begin(dict(ENDLESS, width=64, height=48), big)
+        wait(lambda: self.running() == 1)
+        thread, answers = self.later(lit, other)
+        wait(lambda: self.d.metric("penumbra_queue_depth") == 1)
+        small = self.d.render(big, SMALL)
+        self.assertEqual((small.status, answers), (200, []))
+        long.close()
+        thread.join()
+        self.assertEqual((answers[0].status, answers[0].body), (200, alone.body), answers[0].body[:300])
+        # What would not fit alone is told so at once, with the numbers.
+        answer = self.d.render(other, dict(SMALL, width=2000, height=2000))
+        self.assertEqual(answer.status, 413, answer.body)
+        self.assertRegex(answer.json()["detail"], r"\d+ MiB are allowed.*fewer pixels.*--gpu-memory")
+        for name in ("worker_restarts", "worker_hangs"):
+            self.assertEqual(self.d.metric("penumbra_%s_total" % name), 0, name)
 
     def descriptors(self):
         return len(os.listdir("/proc/%d/fd" % self.d.worker()))

@@ -20,8 +20,7 @@ static void die(const struct pen_error *error)
     exit(1);
 }
 
-void fixture_scene(struct pen_renderer *renderer, uint32_t kind, uint32_t triangles, uint32_t seed,
-    uint8_t id[PEN_ID_BYTES])
+int fixture_blob(uint32_t kind, uint32_t triangles, uint32_t seed, uint8_t id[PEN_ID_BYTES])
 {
     struct pen_error error = {0};
     struct pen_generated_options options = {.kind = kind, .triangles = triangles, .seed = seed};
@@ -35,6 +34,14 @@ void fixture_scene(struct pen_renderer *renderer, uint32_t kind, uint32_t triang
     if (fd < 0 || write(fd, data, bytes) != (ssize_t)bytes)
         exit(1);
     free(data);
+    return fd;
+}
+
+void fixture_scene(struct pen_renderer *renderer, uint32_t kind, uint32_t triangles, uint32_t seed,
+    uint8_t id[PEN_ID_BYTES])
+{
+    struct pen_error error = {0};
+    int fd = fixture_blob(kind, triangles, seed, id);
     if (!pen_renderer_load_scene(renderer, id, fd, &error))
         die(&error);
     close(fd);

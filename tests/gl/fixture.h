@@ -6,6 +6,8 @@
 /* A renderer, or NULL with *error; `device` as enum pen_device_choice. */
 struct pen_renderer *fixture_renderer(
     uint32_t device, uint64_t gpu_memory, struct pen_error *error);
+/* A generated scene's blob and its id; the caller closes it. Exits on failure. */
+int fixture_blob(uint32_t kind, uint32_t triangles, uint32_t seed, uint8_t id[PEN_ID_BYTES]);
 /* Loads a generated scene under an id made of `kind` and `seed`. Exits on failure. */
 void fixture_scene(struct pen_renderer *renderer, uint32_t kind, uint32_t triangles, uint32_t seed,
     uint8_t id[PEN_ID_BYTES]);

@@ -47,9 +47,16 @@ static bool submit(struct scheduler *s, struct client *client, uint8_t key, bool
     return ok;
 }
 
+static enum take fits_always(void *context, struct render *render)
+{
+    (void)context, (void)render;
+    return TAKE_FITS;
+}
+static const struct taker any = {fits_always, NULL};
+
 static uint32_t take_and_finish(struct scheduler *s, uint32_t code)
 {
-    struct render *render = scheduler_take(s, UINT64_MAX);
+    struct render *render = scheduler_take(s, &any);
     if (!render)
         return 0;
     uint32_t width = render->request.width;
@@ -70,7 +77,7 @@ static void test_order(void)
 {
     struct scheduler *s = make(100, 0);
     struct client c[24];
-    CHECK(scheduler_take(s, UINT64_MAX) == NULL);
+    CHECK(scheduler_take(s, &any) == NULL);
     for (uint8_t i = 0; i < 4; i++)
         CHECK(submit(s, &c[i], 100 + i, true, true, 1, 1000, NULL));
     for (uint8_t i = 4; i < 24; i++)
@@ -140,7 +147,7 @@ static void test_sharing(void)
     CHECK(submit(s, &a, 1, true, true, 1, 1000, NULL));
     CHECK(submit(s, &d, 2, true, true, 1, 1000, NULL));
     CHECK(submit(s, &b, 2, false, true, 2, 1000, NULL)); /* lifts the batch render it joins */
-    struct render *render = scheduler_take(s, UINT64_MAX);
+    struct render *render = scheduler_take(s, &any);
     CHECK(render && render->request.width == 2);
     CHECK(submit(s, &c, 2, false, false, 3, 1000, NULL)); /* wants its own */
     struct client late;
@@ -159,7 +166,7 @@ static void test_time(void)
     struct scheduler *s = make(10, 0);
     struct client queued, running, patient;
     CHECK(submit(s, &running, 1, false, true, 1, 20, NULL));
-    struct render *render = scheduler_take(s, UINT64_MAX);
+    struct render *render = scheduler_take(s, &any);
     CHECK(submit(s, &queued, 2, false, true, 1, 20, NULL));
     CHECK(submit(s, &patient, 3, false, true, 1, 60000, NULL));
     uint64_t next = scheduler_expire(s);
@@ -178,7 +185,7 @@ static void test_time(void)
     CHECK(n.expired == 2 && n.queued == 1 && n.running == 0 && n.waiting == 1);
     scheduler_cancel(s);
     CHECK(patient.answers == 1 && patient.code == PEN_UNAVAILABLE);
-    CHECK(scheduler_take(s, UINT64_MAX) == NULL);
+    CHECK(scheduler_take(s, &any) == NULL);
     scheduler_destroy(s);
 }
 
@@ -188,21 +195,67 @@ static void test_return_and_gone(void)
     struct client a, b, gone;
     CHECK(submit(s, &a, 1, false, true, 1, 1000, NULL));
     CHECK(submit(s, &b, 2, false, true, 1, 1000, NULL));
-    struct render *render = scheduler_take(s, UINT64_MAX);
+    struct render *render = scheduler_take(s, &any);
     render->attempts = 1;
     scheduler_return(s, render); /* first again */
-    render = scheduler_take(s, UINT64_MAX);
+    render = scheduler_take(s, &any);
     CHECK(render->request.width == 1 && render->attempts == 1);
     struct outcome outcome = {0};
     scheduler_finish(s, render, &outcome);
     CHECK(submit(s, &gone, 3, false, true, 1, 1000, NULL));
     gone.gone = true;
     CHECK(take_and_finish(s, 0) == 2);
-    CHECK(scheduler_take(s, UINT64_MAX) == NULL);
+    CHECK(scheduler_take(s, &any) == NULL);
     CHECK(gone.answers == 1 && gone.code == PEN_TIMEOUT && a.answers == 1 && b.answers == 1);
     struct scheduler_numbers n;
     scheduler_read(s, &n);
     CHECK(n.abandoned == 1 && n.waiting == 0 && n.queued == 0 && n.running == 0);
+    scheduler_destroy(s);
+}
+
+/* What cannot be taken is passed, and its scene with it or not, or nothing is taken before it. */
+struct choosy {
+    enum take answers[8]; /* by width */
+};
+
+static enum take fits_choosy(void *context, struct render *render)
+{
+    return ((struct choosy *)context)->answers[render->request.width];
+}
+
+static uint32_t take_width(struct scheduler *s, struct choosy *choosy)
+{
+    struct render *render = scheduler_take(s, &(struct taker){fits_choosy, choosy});
+    if (!render)
+        return 0;
+    uint32_t width = render->request.width;
+    scheduler_finish(s, render, &(struct outcome){0});
+    return width;
+}
+
+static void test_what_does_not_fit(void)
+{
+    struct scheduler *s = make(10, 0);
+    struct client c[5];
+    struct choosy choosy = {{0}};
+    for (uint8_t i = 1; i <= 4; i++)
+        CHECK(submit(s, &c[i], i, false, true, 1, 60000, NULL)); /* all of one scene */
+    choosy.answers[1] = TAKE_LATER;
+    CHECK(take_width(s, &choosy) == 2);
+    choosy.answers[1] = TAKE_SCENE_LATER;
+    CHECK(take_width(s, &choosy) == 0);
+    choosy.answers[1] = TAKE_NOTHING;
+    CHECK(take_width(s, &choosy) == 0);
+    choosy.answers[1] = TAKE_FITS;
+    choosy.answers[3] = TAKE_NOTHING;
+    CHECK(take_width(s, &choosy) == 1);
+    choosy.answers[3] = TAKE_LATER;
+    CHECK(take_width(s, &choosy) == 4);
+    CHECK(take_width(s, &choosy) == 0);
+    choosy.answers[3] = TAKE_FITS;
+    struct render *render = scheduler_take(s, &any);
+    CHECK(render->request.width == 3 && render->passed == 1);
+    scheduler_finish(s, render, &(struct outcome){0});
     scheduler_destroy(s);
 }
 
@@ -233,7 +286,7 @@ static void *worker(void *argument)
     uint32_t n = 0;
     while (!__atomic_load_n(&crowd_done, __ATOMIC_ACQUIRE)) {
         scheduler_expire(s);
-        struct render *render = scheduler_take(s, UINT64_MAX);
+        struct render *render = scheduler_take(s, &any);
         struct outcome outcome = {0};
         if (!render)
             usleep(20);
@@ -285,6 +338,7 @@ int main(void)
     test_sharing();
     test_time();
     test_return_and_gone();
+    test_what_does_not_fit();
     test_threads();
     CHECK_DONE();
 }

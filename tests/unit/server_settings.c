@@ -26,7 +26,7 @@ static void test_config(void)
     CHECK(read_flags(&c, NULL, NULL, NULL));
     CHECK_STR(c.listen, "127.0.0.1:8080");
     CHECK(
-        c.queue_limit == 64 && c.gpu_memory.bytes == 1u << 30 && !c.require_gpu.on && c.warm_up.on);
+        c.queue_limit == 64 && c.gpu_memory.bytes == 2u << 30 && !c.require_gpu.on && c.warm_up.on);
     CHECK(read_flags(&c, "--queue-limit=9", "--require-gpu", "--gpu-memory=3G"));
     CHECK(c.queue_limit == 9 && c.require_gpu.on && c.gpu_memory.bytes == 3ull << 30);
     CHECK(read_flags(&c, "--store", "x=y", "--require-gpu=off"));

@@ -1,0 +1,167 @@
+/* What there is no room for beside renders in progress waits, and is refused only when it would not
+ * fit alone. */
+#include "tests/gl/fixture.h"
+#include "tests/unit/check.h"
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+#define TRIANGLES 60000
+
+enum { IN_USE, WANTED, IMAGE, BLOBS }; /* of equal size */
+
+struct blobs {
+    uint8_t ids[BLOBS][PEN_ID_BYTES];
+    int fds[BLOBS];
+};
+
+struct progress {
+    struct pen_request request;
+    struct pen_frame frame;
+    struct pen_result result;
+    struct pen_render *render;
+};
+
+static struct blobs blobs;
+
+static void make_blobs(void)
+{
+    for (uint32_t i = 0; i < BLOBS; i++)
+        blobs.fds[i] = fixture_blob(PEN_GENERATED_HAIRBALL, TRIANGLES, i + 1, blobs.ids[i]);
+}
+
+/* `image`: the request needs IMAGE, too. */
+static enum pen_admission admit(struct pen_renderer *r, const struct pen_request *request, int blob,
+    bool image, struct pen_error *error)
+{
+    struct pen_blobs wanted = {.count = 1 + image,
+        .ids = {blobs.ids[blob], blobs.ids[IMAGE]},
+        .fds = {blobs.fds[blob], blobs.fds[IMAGE]}};
+    memset(error, 0, sizeof *error);
+    return pen_renderer_admit(r, request, &wanted, error);
+}
+
+static void make_request(struct pen_request *request, int blob)
+{
+    fixture_request(request, blobs.ids[blob], "pcf");
+    double texels = 64; /* so that shadow inputs hardly count */
+    const struct pen_technique_info *info = pen_catalogue_find(pen_renderer_catalogue(), "pcf");
+    pen_param_store(
+        pen_param_find(info->params, "map_size"), request->technique_params, &texels, "", NULL);
+    request->width = 80, request->height = 60;
+}
+
+/* One that has begun and has its first turn. */
+static void begin(struct pen_renderer *r, struct progress *p, int blob)
+{
+    struct pen_error error;
+    make_request(&p->request, blob);
+    CHECK(admit(r, &p->request, blob, false, &error) == PEN_ADMITTED);
+    p->render = pen_render_begin(r, &p->request, &p->frame, &p->result, &error);
+    CHECK(p->render && !pen_render_advance(p->render, 0));
+}
+
+static void end(struct progress *p)
+{
+    while (!pen_render_advance(p->render, 1000))
+        ;
+    CHECK(pen_render_end(p->render, NULL));
+    pen_frame_finish(&p->frame);
+}
+
+static uint64_t bytes_of_one(void)
+{
+    struct pen_error error;
+    struct pen_renderer *r = fixture_renderer(PEN_DEVICE_AUTO, 0, &error);
+    uint64_t bytes = 0;
+    if (r && pen_renderer_load_scene(r, blobs.ids[0], blobs.fds[0], &error))
+        bytes = pen_renderer_gpu_bytes(r);
+    pen_renderer_destroy(r);
+    return bytes;
+}
+
+/* There is room for two blobs and a half, and three are wanted. */
+static void check_scenes_in_use(uint64_t blob)
+{
+    struct pen_error error;
+    uint64_t budget = 5 * blob / 2;
+    struct pen_renderer *r = fixture_renderer(PEN_DEVICE_AUTO, budget, &error);
+    struct pen_request request;
+    struct pen_result result;
+    struct progress other = {0};
+    make_request(&request, WANTED);
+    CHECK(admit(r, &request, WANTED, true, &error) == PEN_ADMITTED);
+    uint64_t alone = fixture_render(r, &request, &result);
+    pen_renderer_drop_scene(r, blobs.ids[WANTED]);
+    pen_renderer_drop_scene(r, blobs.ids[IMAGE]);
+    begin(r, &other, IN_USE);
+    for (int i = 0; i < 3; i++) {
+        CHECK(admit(r, &request, WANTED, true, &error) == PEN_LATER && !error.code);
+        CHECK(pen_renderer_has_scene(r, blobs.ids[IN_USE]));
+        CHECK(pen_renderer_gpu_bytes(r) <= budget);
+    }
+    /* Without its image there is room. */
+    CHECK(admit(r, &request, WANTED, false, &error) == PEN_ADMITTED);
+    CHECK(admit(r, &request, WANTED, true, &error) == PEN_LATER);
+    end(&other);
+    CHECK(admit(r, &request, WANTED, true, &error) == PEN_ADMITTED);
+    CHECK(pen_renderer_has_scene(r, blobs.ids[WANTED]) &&
+          pen_renderer_has_scene(r, blobs.ids[IMAGE]));
+    CHECK(fixture_render(r, &request, &result) == alone);
+    pen_renderer_destroy(r);
+}
+
+/* The picture's own buffers count while it is being made, and afterwards as long as they are kept. */
+static void check_pictures(uint64_t blob)
+{
+    struct pen_error error;
+    uint64_t budget = 3 * blob;
+    struct pen_renderer *r = fixture_renderer(PEN_DEVICE_AUTO, budget, &error);
+    struct pen_request large, small;
+    struct progress other = {0};
+    make_request(&small, IN_USE);
+    make_request(&large, IN_USE);
+    /* 28 bytes are the least that a pixel takes: depth, two normals, albedo, surface, visibility. */
+    large.width = 1024;
+    large.height = (uint32_t)(3 * blob / 4 / (28 * 1024));
+    begin(r, &other, IN_USE);
+    CHECK(pen_renderer_gpu_bytes(r) > blob + 80 * 60 * 20);
+    CHECK(admit(r, &small, IN_USE, false, &error) == PEN_ADMITTED);
+    struct progress big = {.request = large};
+    CHECK(admit(r, &large, IN_USE, false, &error) == PEN_ADMITTED);
+    big.render = pen_render_begin(r, &big.request, &big.frame, &big.result, &error);
+    CHECK(big.render != NULL);
+    CHECK(admit(r, &large, IN_USE, false, &error) == PEN_LATER);
+    CHECK(admit(r, &small, IN_USE, false, &error) == PEN_ADMITTED);
+    end(&other);
+    CHECK(admit(r, &large, IN_USE, false, &error) == PEN_LATER);
+    end(&big);
+    CHECK(pen_renderer_gpu_bytes(r) <= budget);
+    CHECK(admit(r, &large, IN_USE, false, &error) == PEN_ADMITTED);
+    /* Too large alone: the numbers are named. */
+    large.height *= 6;
+    CHECK(admit(r, &large, IN_USE, false, &error) == PEN_REFUSED && error.code == PEN_TOO_BIG);
+    CHECK(strstr(error.message, "fewer pixels") && strstr(error.message, "--gpu-memory"));
+    char allowed[32];
+    snprintf(allowed, sizeof allowed, "%.0f MiB are allowed", (double)budget / (1 << 20));
+    CHECK(strstr(error.message, allowed));
+    CHECK(admit(r, &small, IN_USE, false, &error) == PEN_ADMITTED);
+    pen_renderer_destroy(r);
+}
+
+int main(void)
+{
+    struct pen_error error;
+    struct pen_renderer *r = fixture_renderer(PEN_DEVICE_AUTO, 0, &error);
+    if (!r)
+        return 77;
+    pen_renderer_destroy(r);
+    make_blobs();
+    uint64_t blob = bytes_of_one();
+    CHECK(blob > 1 << 20);
+    check_scenes_in_use(blob);
+    check_pictures(blob);
+    for (uint32_t i = 0; i < BLOBS; i++)
+        close(blobs.fds[i]);
+    CHECK_DONE();
+}

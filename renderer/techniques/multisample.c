@@ -66,7 +66,7 @@ static bool record(struct technique_run *run, struct pen_error *error)
 {
     const struct multisample *params = run->params;
     struct sample_point points[MAX_SAMPLES];
-    sample_points(run->face, params->samples, points);
+    sample_sequence(run->face, params->samples, points);
     uint64_t bytes = (uint64_t)params->samples * params->map_size * params->map_size * 4;
     bool keep = bytes <= run->ctx->shadow_budget;
     const struct gl_target *sum = pass_sum(run);

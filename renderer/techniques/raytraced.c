@@ -54,6 +54,20 @@ static void destroy(struct technique_ctx *ctx, void *state)
     ray_targets_finish(&s->targets);
 }
 
+static bool settle(struct technique_run *run, struct pen_error *error)
+{
+    struct state *s = run->state;
+    struct pass_texture traced[] = {
+        {UNIT_TRACED, s->targets.visibility.texture.name, GL_SAMPLE_NEAREST},
+        {UNIT_TRACED_ERROR, s->targets.standard_error.texture.name, GL_SAMPLE_NEAREST}};
+    return pass_screen(run,
+        &(struct pass_screen){.name = "trace resolve",
+            .body = "raytraced.glsl",
+            .textures = traced,
+            .texture_count = 2},
+        error);
+}
+
 static bool trace(struct technique_run *run, struct pen_error *error)
 {
     const struct raytraced *params = run->params;
@@ -62,7 +76,8 @@ static bool trace(struct technique_run *run, struct pen_error *error)
         .target_error = params->target_error,
         .weighting = params->weighting,
         .adaptive = params->adaptive.on && run->face->extent[0] > 0,
-        .seed = params->seed + run->frame + LIGHT_SEED * run->light_index};
+        .seed = params->seed + run->frame + LIGHT_SEED * run->light_index,
+        .settle = settle};
     struct pen_error refused = {0};
 #ifdef PENUMBRA_HAVE_TRACE
     bool automatic = params->backend == BACKEND_AUTO;
@@ -87,20 +102,22 @@ static bool record(struct technique_run *run, struct pen_error *error)
     if (run->face == &run->light->faces[0] && !trace(run, error))
         return false;
     run->work_counted = true;
-    struct pass_texture traced[] = {
-        {UNIT_TRACED, s->targets.visibility.texture.name, GL_SAMPLE_NEAREST},
-        {UNIT_TRACED_ERROR, s->targets.standard_error.texture.name, GL_SAMPLE_NEAREST}};
-    struct pass_screen resolve = {
-        .name = "trace resolve", .body = "raytraced.glsl", .textures = traced, .texture_count = 2};
-    if (!pass_screen(run, &resolve, error))
+    if (!settle(run, error))
         return false;
     if (!run->variance_framebuffer)
         return true;
-    resolve.name = "trace variance";
-    resolve.defines = "#define VARIANCE\n";
-    resolve.framebuffer = run->variance_framebuffer;
-    resolve.add = true;
-    return pass_screen(run, &resolve, error);
+    struct pass_texture traced[] = {
+        {UNIT_TRACED, s->targets.visibility.texture.name, GL_SAMPLE_NEAREST},
+        {UNIT_TRACED_ERROR, s->targets.standard_error.texture.name, GL_SAMPLE_NEAREST}};
+    return pass_screen(run,
+        &(struct pass_screen){.name = "trace variance",
+            .body = "raytraced.glsl",
+            .defines = "#define VARIANCE\n",
+            .textures = traced,
+            .texture_count = 2,
+            .framebuffer = run->variance_framebuffer,
+            .add = true},
+        error);
 }
 
 const struct technique technique_raytraced = {

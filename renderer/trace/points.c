@@ -2,7 +2,7 @@
 #include "renderer/trace/points.h"
 #include <stdlib.h>
 
-#define FIRST_BLOCK 256u /* samples before a receiver may stop early */
+#define FIRST_BLOCK 64u
 
 static uint32_t log2_floor(uint32_t x)
 {
@@ -23,12 +23,13 @@ static void make_rim(struct trace_points *p, uint32_t first, bool round)
     }
 }
 
-bool trace_points_make(struct trace_points *p, uint32_t samples, bool stop, bool round,
-    uint32_t seed, struct pen_error *error)
+bool trace_points_make(
+    struct trace_points *p, uint32_t samples, bool round, uint32_t seed, struct pen_error *error)
 {
     uint32_t net = samples, rim = net + TRACE_PRETEST_NET, total = rim + TRACE_PRETEST_RIM;
     uint32_t *xs = malloc(2 * (size_t)total * sizeof *xs), *ys = xs ? xs + total : NULL;
-    uint32_t block = stop && samples > FIRST_BLOCK ? FIRST_BLOCK : samples;
+    uint32_t block = samples > FIRST_BLOCK ? FIRST_BLOCK : samples;
+    uint32_t early = TRACE_PRETEST_FIRST, late = TRACE_PRETEST_NET - early;
     uint32_t salt = trace_hash(seed + 1);
     if (!xs)
         return pen_fail(error, PEN_INTERNAL, "", "Out of memory.");
@@ -37,11 +38,13 @@ bool trace_points_make(struct trace_points *p, uint32_t samples, bool stop, bool
         .samples = samples,
         .total = total,
         .low_bits = 0xffffffffu >> (log2_floor(block) / 2),
-        .pretest_low_bits = 0xffffffffu >> (log2_floor(TRACE_PRETEST_NET) / 2),
+        .pretest_low_bits = 0xffffffffu >> (log2_floor(TRACE_PRETEST_FIRST) / 2),
         .salt = salt};
-    bool ok = trace_samples_net(0, TRACE_PRETEST_NET, ~seed, xs + net, ys + net);
+    bool ok = trace_samples_net(0, early, ~seed, xs + net, ys + net);
+    for (uint32_t first = early; first < TRACE_PRETEST_NET && ok; first *= 2)
+        ok = trace_samples_net(first, first, ~seed, xs + net + first, ys + net + first);
     for (uint32_t first = 0; first < samples && ok; first += block) {
-        if (first > block) /* 256, 256, 512, 1024, ... : each a net of its own */
+        if (first > block) /* the second is as long as the first, each then as all before it */
             block = first;
         ok = trace_samples_net(first, block, seed, xs + first, ys + first);
         p->blocks[p->block_count++] =
@@ -56,8 +59,10 @@ bool trace_points_make(struct trace_points *p, uint32_t samples, bool stop, bool
         ys[i] ^= 0x80000000u;
     }
     make_rim(p, rim, round);
-    p->pretest =
-        (struct trace_block){p->u + net, p->v + net, TRACE_PRETEST_NET, salt + TRACE_MAX_SAMPLES};
+    uint32_t apart = salt + TRACE_MAX_SAMPLES;
+    p->pretest[0] = (struct trace_block){p->u + net, p->v + net, early, apart};
+    p->pretest[1] =
+        (struct trace_block){p->u + net + early, p->v + net + early, late, apart + early};
     p->rim = (struct trace_block){
         p->u + rim, p->v + rim, TRACE_PRETEST_RIM, salt + TRACE_MAX_SAMPLES + TRACE_PRETEST_NET};
     return true;

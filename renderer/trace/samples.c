@@ -34,6 +34,12 @@ static uint32_t sobol_second(uint32_t index)
     return x;
 }
 
+void trace_sample_at(uint32_t index, uint32_t seed, uint32_t *x, uint32_t *y)
+{
+    *x = scramble(reverse_bits(index), trace_hash(seed));
+    *y = scramble(sobol_second(index), trace_hash(seed ^ 0x9e3779b9u));
+}
+
 struct point {
     uint64_t key;
     uint32_t x, y;
@@ -55,8 +61,8 @@ bool trace_samples_net(uint32_t first, uint32_t count, uint32_t seed, uint32_t *
         bits++;
     uint32_t x_bits = (bits + 1) / 2, y_bits = bits / 2;
     for (uint32_t i = 0; i < count; i++) {
-        uint32_t x = scramble(reverse_bits(first + i), trace_hash(seed));
-        uint32_t y = scramble(sobol_second(first + i), trace_hash(seed ^ 0x9e3779b9u));
+        uint32_t x, y;
+        trace_sample_at(first + i, seed, &x, &y);
         uint64_t cell_x = (uint64_t)x >> (32 - x_bits), cell_y = (uint64_t)y >> (32 - y_bits);
         if (cell_x & 1) /* serpentine, so that consecutive cells touch */
             cell_y = ((uint64_t)1 << y_bits) - 1 - cell_y;

@@ -64,6 +64,8 @@ enum pen_trace_weighting {
     PEN_TRACE_G,    /* weighted by cos(receiver) cos(light) / distance^2 */
 };
 
+enum pen_trace_step { PEN_TRACE_GO_ON, PEN_TRACE_SHOW, PEN_TRACE_STOP };
+
 /* Receivers, and how they are sampled. Receivers are in rows: neighbours in the image should be
  * neighbours here. A receiver whose normal is (0,0,0) is none: it costs nothing and is lit. */
 struct pen_trace_job {
@@ -95,6 +97,11 @@ struct pen_trace_job {
     bool (*turn)(void *context);
     void *turn_context;
     double turn_ms;
+    /* Called likewise whenever all receivers have had `done` of the samples. SHOW: the result's arrays
+     * are filled with what that gives, and `show` is called; false from it as from `turn`. STOP: that
+     * is the result. NULL: nobody asks. */
+    enum pen_trace_step (*step)(void *context, uint32_t done, uint32_t total);
+    bool (*show)(void *context);
 };
 
 struct pen_trace_result { /* each array: width * height, or NULL when not wanted */
@@ -124,7 +131,7 @@ struct pen_trace_stats {
 
 /* Visibility of one light from every receiver. The same job gives the same bytes for any number of
  * threads on the same kind of CPU.
- * Sampling: one Owen-scrambled Sobol (0,2)-net per job; every receiver shifts its low bits by a
+ * Sampling: one Owen-scrambled Sobol (0,2)-sequence per job; every receiver shifts its low bits by a
  * digital XOR of its own, which keeps the net's stratification, turns bands into noise and lets
  * neighbouring rays of a packet aim at the same part of the light.
  * Errors: PEN_INVALID for a bad job, PEN_DEADLINE, PEN_INTERNAL. `stats` may be NULL. */

@@ -101,26 +101,41 @@ static void check_watching(struct pen_renderer *r, const struct pen_request *req
     pen_frame_finish(&plain);
 }
 
-/* Every method, two jittered frames. */
-static void check_methods(
-    struct pen_renderer *r, const uint8_t scene[PEN_ID_BYTES], const char *only)
+static void make_request(struct pen_request *request, const uint8_t scene[PEN_ID_BYTES],
+    const char *technique, uint32_t antialias)
 {
-    const struct pen_catalogue *catalogue = pen_renderer_catalogue();
-    for (uint32_t i = 0; i < catalogue->count; i++) {
-        struct pen_request request;
-        if (only && strcmp(only, catalogue->items[i]->name))
-            continue;
-        fixture_request(&request, scene, catalogue->items[i]->name);
-        request.width = 96, request.height = 72;
-        request.antialias = 2;
-        set_number(&request, "samples", 40);
-        set_number(&request, "map_size", 256);
-        set_number(&request, "series_size", 256);
-        check_watching(r, &request);
-    }
+    fixture_request(request, scene, technique);
+    request->width = 96, request->height = 72;
+    request->antialias = antialias;
+    set_number(request, "samples", technique[0] == 'r' ? 256 : 64);
+    set_number(request, "map_size", 256);
 }
 
-int main(int argc, char **argv)
+/* The mean visibility comes nearer to what it will be, as far as the estimate says. */
+static void check_falling(struct pen_renderer *r, const struct pen_request *request)
+{
+    struct parts parts = {.count = 0};
+    struct pen_frame last;
+    struct pen_result result;
+    double before = INFINITY;
+    CHECK(render(r, request, INFINITY, &parts, &last, &result));
+    CHECK(parts.count >= 3);
+    for (uint32_t i = 0; i < parts.count; i++) {
+        const struct pen_progress *progress = &parts.results[i].progress;
+        double off = distance(&parts.frames[i], &last) / 255;
+        printf("%s: %u of %u, off %.4f, estimate %.4f\n", request->technique, progress->done,
+            progress->total, off, (double)progress->standard_error);
+        CHECK(off < before);
+        before = off;
+        /* A random variable of few degrees of freedom, and over the ground's far part, too. */
+        CHECK(i == 0 || (progress->standard_error > off / 4 && progress->standard_error < 8 * off));
+    }
+    CHECK(result.progress.standard_error < parts.results[parts.count - 1].progress.standard_error);
+    finish(&parts);
+    pen_frame_finish(&last);
+}
+
+int main(void)
 {
     struct pen_error error;
     struct pen_renderer *r = fixture_renderer(PEN_DEVICE_AUTO, 0, &error);
@@ -130,7 +145,17 @@ int main(int argc, char **argv)
     }
     uint8_t scene[PEN_ID_BYTES];
     fixture_scene(r, PEN_GENERATED_DEMO, 0, 1, scene);
-    check_methods(r, scene, argc > 1 ? argv[1] : NULL);
+    static const char *const names[] = {"multisample", "raytraced", "stochastic", "pcss"};
+    struct pen_request request;
+    for (int i = 0; i < 4; i++) {
+        make_request(&request, scene, names[i], 2);
+        check_watching(r, &request);
+    }
+    for (int i = 0; i < 2; i++) {
+        make_request(&request, scene, names[i], 1);
+        request.output.layer = PEN_LAYER_VISIBILITY;
+        check_falling(r, &request);
+    }
     pen_renderer_destroy(r);
     CHECK_DONE();
 }

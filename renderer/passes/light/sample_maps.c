@@ -3,6 +3,7 @@
 #include "renderer/passes/draw/turn.h"
 #include "renderer/passes/map/depth_map.h"
 #include "renderer/passes/map/shadow_cache.h"
+#include "renderer/trace/points.h"
 #include <assert.h>
 #include <math.h>
 #include <string.h>
@@ -44,6 +45,21 @@ void sample_points(const struct light_face *face, uint32_t count, struct sample_
     for (uint32_t i = 0; i < count; i++)
         points[i] = sample_point_at(face, 2 * ((float)i + 0.5f) / (float)count - 1,
             2 * (radical_inverse(i) + 0.5f / (float)count) - 1);
+}
+
+/* Of 400 scrambles the one that comes nearest to the areas that 4000 straight edges and corners cut
+ * off, after 16, 64 and 256 points: edges as well as the Hammersley set, corners better. */
+#define SEQUENCE_SEED 353u
+
+void sample_sequence(const struct light_face *face, uint32_t count, struct sample_point *points)
+{
+    for (uint32_t i = 0; i < count; i++) {
+        uint32_t x, y;
+        trace_sample_at(i, SEQUENCE_SEED, &x, &y);
+        points[i] = sample_point_at(face, (float)x * 0x1p-31f - 1, (float)y * 0x1p-31f - 1);
+    }
+    if (count == 1) /* a point light's shadow is expected */
+        points[0] = sample_point_at(face, 0, 0);
 }
 
 struct sample_map sample_map_entry(

@@ -15,6 +15,8 @@ struct ray_job {
     uint32_t weighting; /* enum pen_trace_weighting */
     bool adaptive;      /* all samples only near receivers whose pre-test is mixed */
     uint32_t seed;
+    /* Turns targets into vis, for an estimate that is to be seen (passes/draw/show.h). */
+    bool (*settle)(struct technique_run *run, struct pen_error *error);
 };
 
 /* What a light's rays leave, and room to work in; kept between frames. Zero to start. */

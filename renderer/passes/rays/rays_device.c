@@ -83,7 +83,7 @@ static void fill_block(const struct work *w, struct ray_block *b)
     float half[2] = {l->half[0], l->half[l->type == PEN_TRACE_RECT]};
     uint32_t seed = w->job->seed;
     *b = (struct ray_block){.net = {trace_hash(seed), p->low_bits, p->salt, p->samples},
-        .pretest = {trace_hash(~seed), p->pretest_low_bits, p->pretest.salt},
+        .pretest = {trace_hash(~seed), p->pretest_low_bits, p->pretest[0].salt},
         .size = {w->run->width, w->run->height, w->scene->node_count}};
     for (int c = 0; c < 3; c++) {
         b->origin[c] = l->origin[c];
@@ -128,8 +128,7 @@ static bool prepare(struct work *w, struct pen_error *error)
     uint32_t width = w->run->width, height = w->run->height;
     struct ray_block block;
     bool round = w->light.type != PEN_TRACE_RECT;
-    if (!trace_points_make(
-            &w->points, w->samples, w->job->target_error > 0, round, w->job->seed, error) ||
+    if (!trace_points_make(&w->points, w->samples, round, w->job->seed, error) ||
         !upload_points(w, error))
         return false;
     gl_target_fit(&t->visibility, GL_RGBA32F, width, height, 0, 1);
@@ -234,10 +233,11 @@ static bool sample_range(
             uint32_t points = end - point < step ? end - point : step;
             bool last = point + points == end;
             gl.ProgramUniform4ui(name, LOCATION_RANGE, first, count, point, points);
+            bool may_stop = w->job->target_error > 0 && end >= TRACE_STOP_AFTER;
             gl.ProgramUniform1ui(name, LOCATION_ENDS,
-                !last                     ? 0u
-                : b + 1 == p->block_count ? 2u
-                                          : 1u);
+                last && b + 1 == p->block_count ? 2u
+                : last && may_stop              ? 1u
+                                                : 0u);
             if (!dispatch(w, name, groups(count, RAY_GROUP), 1, error))
                 return false;
         }

@@ -1,6 +1,7 @@
 /* Rays on the CPU: read the receivers back, trace, upload. */
 #include "protocol/container.h"
 #include "protocol/memory.h"
+#include "renderer/passes/draw/show.h"
 #include "renderer/passes/draw/turn.h"
 #include "renderer/passes/rays/rays.h"
 #include <stdlib.h>
@@ -71,14 +72,45 @@ static void write_target(const struct technique_run *run, struct gl_target *targ
 }
 
 struct waiting {
-    struct technique_ctx *ctx;
+    struct technique_run *run;
+    const struct ray_job *job;
+    struct ray_targets *targets;
+    const struct pen_trace_result *result;
     struct pen_error *error;
 };
 
 static bool turn(void *context)
 {
     struct waiting *w = context;
-    return pass_turn(w->ctx, w->error);
+    return pass_turn(w->run->ctx, w->error);
+}
+
+static enum pen_trace_step step(void *context, uint32_t done, uint32_t total)
+{
+    static const enum pen_trace_step steps[] = {
+        [STEP_GO_ON] = PEN_TRACE_GO_ON, [STEP_SHOW] = PEN_TRACE_SHOW, [STEP_STOP] = PEN_TRACE_STOP};
+    struct waiting *w = context;
+    return steps[pass_step(w->run, done, total)];
+}
+
+static void write_result(const struct waiting *w)
+{
+    struct technique_run *run = w->run;
+    write_target(run, &w->targets->visibility, GL_RGBA32F, GL_RGBA, w->result->visibility);
+    gl_target_fit(&w->targets->standard_error, GL_R32F, run->width, run->height, 0, 1);
+    if (w->result->standard_error)
+        write_target(run, &w->targets->standard_error, GL_R32F, GL_RED, w->result->standard_error);
+}
+
+static bool show(void *context)
+{
+    struct waiting *w = context;
+    struct gl_timer *timer = &w->run->ctx->timer;
+    gl_timer_end(timer);
+    write_result(w);
+    bool ok = w->job->settle(w->run, w->error) && pass_show(w->run, w->error);
+    gl_timer_begin(timer, PEN_STAGE_TECHNIQUE, "trace");
+    return ok;
 }
 
 bool pass_rays_host(struct technique_run *run, const struct ray_job *job, struct ray_targets *t,
@@ -106,16 +138,18 @@ bool pass_rays_host(struct technique_run *run, const struct ray_job *job, struct
         .depth_error = RAY_DEPTH_ERROR,
         .aim_error = ray_aim_error(run),
         .seed = job->seed};
-    struct waiting waiting = {run->ctx, error};
-    if (run->ctx->turns.fiber) {
-        trace.turn = turn;
-        trace.turn_context = &waiting;
-        trace.turn_ms = run->ctx->turns.most_ms;
-    }
     memcpy(trace.eye, run->view->eye, sizeof trace.eye);
     bool wants_error = run->variance_framebuffer != 0;
     struct pen_trace_result result = {
         .visibility = visibility, .standard_error = wants_error ? standard_error : NULL};
+    struct waiting waiting = {run, job, t, &result, error};
+    if (run->ctx->turns.fiber) {
+        trace.turn = turn;
+        trace.step = step;
+        trace.show = show;
+        trace.turn_context = &waiting;
+        trace.turn_ms = run->ctx->turns.most_ms;
+    }
     struct pen_trace_stats stats;
     read_texture(&t->receivers[0].texture, positions);
     read_texture(&t->receivers[1].texture, normals);
@@ -123,10 +157,7 @@ bool pass_rays_host(struct technique_run *run, const struct ray_job *job, struct
     bool ok = pen_trace_visibility(scene, &light, &trace, &result, &stats, error);
     gl_timer_end(&run->ctx->timer);
     if (ok) {
-        write_target(run, &t->visibility, GL_RGBA32F, GL_RGBA, visibility);
-        gl_target_fit(&t->standard_error, GL_R32F, run->width, run->height, 0, 1);
-        if (wants_error)
-            write_target(run, &t->standard_error, GL_R32F, GL_RED, standard_error);
+        write_result(&waiting);
         run->result->rays += stats.rays;
         run->result->full_work_pixels += (uint32_t)stats.full_receivers;
     }

@@ -1,14 +1,22 @@
 /* A job over an image of receivers: tiles, the pre-test, and when to stop. */
 #include "renderer/trace/embree/packet.h"
+#include "renderer/trace/embree/verdicts.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #define TILE 16 /* receivers along an edge; a multiple of 4 */
 #define TILE_RECEIVERS (TILE * TILE)
-#define FIRST_TILES 4 /* of each thread, before their speed is known */
+#define FIRST_TILES 4           /* of each thread, before their speed is known */
+#define SUMS_BYTES (512u << 20) /* of those that are kept from block to block */
 
-enum verdict { NO_RECEIVER, UMBRA, LIT, MIXED };
+struct kept_count {
+    uint32_t count;
+    float pairs;
+};
+struct kept_sums {
+    double weight, visible, rgb[3];
+};
 
 struct run {
     const struct pen_trace_scene *scene;
@@ -21,6 +29,14 @@ struct run {
     struct trace_points points;
     uint8_t *verdicts; /* adaptive: enum verdict per receiver */
     uint8_t *full;     /* adaptive: 1 where all samples are wanted */
+    uint8_t *early;    /* adaptive, in steps: of the pre-test's first points those that were seen */
+    /* In steps, after the blocks before the one at hand: one per receiver, or NULL: a tile takes all
+     * its blocks at once. */
+    struct kept_count *counts;
+    struct kept_sums *sums; /* NULL: nothing is weighted or coloured */
+    uint32_t block;         /* at hand */
+    uint32_t taken;         /* samples before it, or of the pre-test while there are no sums */
+    bool enough;            /* there are no more wanted */
     uint32_t tiles_x, tile_width, tile_height;
     uint32_t tiles, first_tile; /* of all, and of the piece at hand */
     _Atomic uint64_t rays, receivers, full_receivers;
@@ -141,28 +157,42 @@ static void finish(const struct run *run, uint32_t pixel, const struct total *t,
     store(run, pixel, rgb, visible, error_of(t), traced ? t->samples : 0);
 }
 
+/* Adds one block to the totals of the listed receivers. */
+static void add_block(struct run *run, uint32_t b, const struct trace_receiver *receivers,
+    uint32_t count, uint32_t extra_mode, struct total *totals)
+{
+    const struct trace_block *block = &run->points.blocks[b];
+    struct trace_packet packet;
+    uint64_t rays = 0;
+    for (uint32_t first = 0; first < count; first += TRACE_LANES) {
+        uint32_t lanes = count - first < TRACE_LANES ? count - first : TRACE_LANES;
+        struct trace_sums sums = {0};
+        trace_packet_load(
+            &packet, &run->emitter, receivers + first, lanes, run->job->seed, run->points.low_bits);
+        trace_packet_run(&run->emitter, &packet, block, run->mode | extra_mode, &sums);
+        for (uint32_t lane = 0; lane < lanes; lane++)
+            add_sums(run, &totals[first + lane], &sums, (int)lane, block->count);
+        rays += sums.rays;
+    }
+    atomic_fetch_add(&run->rays, rays);
+}
+
+static bool is_done(const struct run *run, uint32_t b, const struct total *t)
+{
+    return b + 1 == run->points.block_count ||
+           (t->samples >= TRACE_STOP_AFTER && error_of(t) < run->job->target_error);
+}
+
 /* Takes all samples, or as many as the asked error needs, for the listed receivers. */
 static void sample_receivers(
     struct run *run, struct trace_receiver *receivers, uint32_t count, uint32_t extra_mode)
 {
-    struct trace_packet packet;
     struct total totals[TILE_RECEIVERS] = {0};
-    uint64_t rays = 0;
     for (uint32_t b = 0; b < run->points.block_count && count; b++) {
-        for (uint32_t first = 0; first < count; first += TRACE_LANES) {
-            uint32_t lanes = count - first < TRACE_LANES ? count - first : TRACE_LANES;
-            struct trace_sums sums = {0};
-            trace_packet_load(&packet, &run->emitter, receivers + first, lanes, run->job->seed,
-                run->points.low_bits);
-            trace_packet_run(
-                &run->emitter, &packet, &run->points.blocks[b], run->mode | extra_mode, &sums);
-            for (uint32_t lane = 0; lane < lanes; lane++)
-                add_sums(run, &totals[first + lane], &sums, (int)lane, run->points.blocks[b].count);
-            rays += sums.rays;
-        }
+        add_block(run, b, receivers, count, extra_mode, totals);
         uint32_t kept = 0;
         for (uint32_t i = 0; i < count; i++) {
-            if (b + 1 == run->points.block_count || error_of(&totals[i]) < run->job->target_error) {
+            if (is_done(run, b, &totals[i])) {
                 finish(run, receivers[i].pixel, &totals[i], !(extra_mode & TRACE_ASSUME_VISIBLE));
                 continue;
             }
@@ -171,7 +201,72 @@ static void sample_receivers(
         }
         count = kept;
     }
-    atomic_fetch_add(&run->rays, rays);
+}
+
+/* What a receiver has gathered in the blocks before. */
+static struct total recall(const struct run *run, uint32_t pixel, uint32_t samples)
+{
+    const struct kept_count *k = &run->counts[pixel];
+    const struct kept_sums *s = run->sums ? &run->sums[pixel] : NULL;
+    struct total t = {.samples = samples, .count = k->count, .pairs = (double)k->pairs};
+    t.weight = s ? s->weight : samples;
+    t.visible = s ? s->visible : k->count;
+    for (int c = 0; c < 3; c++)
+        t.rgb[c] = s ? s->rgb[c] : k->count;
+    return t;
+}
+
+static void keep(struct run *run, uint32_t pixel, const struct total *t)
+{
+    run->counts[pixel] = (struct kept_count){t->count, (float)t->pairs};
+    if (run->sums)
+        run->sums[pixel] =
+            (struct kept_sums){t->weight, t->visible, {t->rgb[0], t->rgb[1], t->rgb[2]}};
+}
+
+#define DONE (-1.0f) /* for `pairs` */
+
+/* The block at hand for those of a tile that are not done. */
+static void sample_block(struct run *run, struct trace_receiver *receivers, uint32_t count)
+{
+    struct total totals[TILE_RECEIVERS];
+    uint32_t left = 0;
+    for (uint32_t i = 0; i < count; i++)
+        if (run->counts[receivers[i].pixel].pairs != DONE) {
+            totals[left] = recall(run, receivers[i].pixel, run->taken);
+            receivers[left++] = receivers[i];
+        }
+    add_block(run, run->block, receivers, left, 0, totals);
+    for (uint32_t i = 0; i < left; i++) {
+        uint32_t pixel = receivers[i].pixel;
+        keep(run, pixel, &totals[i]);
+        if (is_done(run, run->block, &totals[i])) {
+            finish(run, pixel, &totals[i], true);
+            run->counts[pixel].pairs = DONE;
+        }
+    }
+}
+
+/* Stores what the receivers that are not done have so far. */
+static void estimate_tile(void *context, uint32_t item)
+{
+    struct run *run = context;
+    struct trace_receiver receivers[TILE_RECEIVERS];
+    uint32_t count = gather(run, tile_of(run, item), run->full, receivers);
+    for (uint32_t i = 0; i < count; i++) {
+        uint32_t pixel = receivers[i].pixel;
+        struct total t = {.samples = run->taken, .weight = run->taken};
+        if (run->counts && run->counts[pixel].pairs == DONE)
+            continue;
+        if (run->counts) {
+            t = recall(run, pixel, run->taken);
+        } else {
+            t.count = run->early[pixel];
+            t.visible = t.rgb[0] = t.rgb[1] = t.rgb[2] = t.count;
+            t.pairs = t.visible * (1 - t.visible / t.weight);
+        }
+        finish(run, pixel, &t, true);
+    }
 }
 
 static bool is_late(struct run *run)
@@ -189,8 +284,12 @@ static void sample_tile(void *context, uint32_t item)
     if (is_late(run))
         return;
     uint32_t count = gather(run, tile_of(run, item), run->full, receivers);
-    atomic_fetch_add(&run->full_receivers, count);
-    sample_receivers(run, receivers, count, 0);
+    if (run->block == 0)
+        atomic_fetch_add(&run->full_receivers, count);
+    if (run->counts)
+        sample_block(run, receivers, count);
+    else
+        sample_receivers(run, receivers, count, 0);
 }
 
 /* Marks what is no receiver, for good. */
@@ -211,6 +310,37 @@ static void clear_tile(void *context, uint32_t item)
     atomic_fetch_add(&run->receivers, receivers);
 }
 
+/* Up to a packet of the receivers from `first` on; returns how many. */
+static uint32_t load_pretest(struct run *run, struct trace_packet *packet,
+    const struct trace_receiver *receivers, uint32_t first, uint32_t count)
+{
+    uint32_t lanes = count - first < TRACE_LANES ? count - first : TRACE_LANES;
+    trace_packet_load(packet, &run->emitter, receivers + first, lanes, ~run->job->seed,
+        run->points.pretest_low_bits);
+    return lanes;
+}
+
+/* The pre-test's first points, for a first picture. */
+static void early_tile(void *context, uint32_t item)
+{
+    struct run *run = context;
+    struct trace_receiver receivers[TILE_RECEIVERS];
+    struct trace_packet packet;
+    uint64_t rays = 0;
+    if (is_late(run))
+        return;
+    uint32_t count = gather(run, tile_of(run, item), NULL, receivers);
+    for (uint32_t first = 0; first < count; first += TRACE_LANES) {
+        uint32_t lanes = load_pretest(run, &packet, receivers, first, count);
+        struct trace_sums sums = {0};
+        trace_packet_run(&run->emitter, &packet, &run->points.pretest[0], TRACE_COUNT_ONLY, &sums);
+        for (uint32_t lane = 0; lane < lanes; lane++)
+            run->early[receivers[first + lane].pixel] = (uint8_t)sums.count[lane];
+        rays += sums.rays;
+    }
+    atomic_fetch_add(&run->rays, rays);
+}
+
 static void pretest_tile(void *context, uint32_t item)
 {
     struct run *run = context;
@@ -221,18 +351,22 @@ static void pretest_tile(void *context, uint32_t item)
         return;
     uint32_t count = gather(run, tile_of(run, item), NULL, receivers);
     for (uint32_t first = 0; first < count; first += TRACE_LANES) {
-        uint32_t lanes = count - first < TRACE_LANES ? count - first : TRACE_LANES;
-        struct trace_sums sums = {0};
-        trace_packet_load(&packet, &run->emitter, receivers + first, lanes, ~run->job->seed,
-            run->points.pretest_low_bits);
-        trace_packet_run(&run->emitter, &packet, &run->points.pretest, TRACE_COUNT_ONLY, &sums);
-        trace_packet_run(&run->emitter, &packet, &run->points.rim, TRACE_UNSHIFTED, &sums);
-        for (uint32_t lane = 0; lane < lanes; lane++)
-            run->verdicts[receivers[first + lane].pixel] =
-                sums.count[lane] == TRACE_PRETEST_NET + TRACE_PRETEST_RIM ? LIT
-                : sums.count[lane] == 0                                   ? UMBRA
-                                                                          : MIXED;
-        rays += sums.rays;
+        uint32_t lanes = load_pretest(run, &packet, receivers, first, count);
+        struct trace_sums sums = {0}, rim = {0};
+        for (int k = run->early ? 1 : 0; k < 2; k++)
+            trace_packet_run(
+                &run->emitter, &packet, &run->points.pretest[k], TRACE_COUNT_ONLY, &sums);
+        trace_packet_run(&run->emitter, &packet, &run->points.rim, TRACE_UNSHIFTED, &rim);
+        for (uint32_t lane = 0; lane < lanes; lane++) {
+            uint32_t pixel = receivers[first + lane].pixel, seen = sums.count[lane];
+            if (run->early)
+                seen = run->early[pixel] = (uint8_t)(run->early[pixel] + seen);
+            seen += rim.count[lane];
+            run->verdicts[pixel] = seen == TRACE_PRETEST_NET + TRACE_PRETEST_RIM ? LIT
+                                   : seen == 0                                   ? UMBRA
+                                                                                 : MIXED;
+        }
+        rays += sums.rays + rim.rays;
     }
     atomic_fetch_add(&run->rays, rays);
 }
@@ -261,37 +395,11 @@ static void settle_tile(void *context, uint32_t item)
     sample_receivers(run, lit, lit_count, TRACE_ASSUME_VISIBLE);
 }
 
-/* Lit beside umbra: a contact, or a silhouette whose penumbra is thinner than a receiver. */
-static bool is_edge(uint8_t a, uint8_t b)
+static bool spread(struct run *run)
 {
-    return (a == LIT && b == UMBRA) || (a == UMBRA && b == LIT);
-}
-
-/* full = a mixed verdict or an edge within `radius` receivers, in x and then in y. */
-static bool dilate(struct run *run)
-{
-    uint32_t w = run->job->width, h = run->job->height;
-    uint32_t radius = run->job->dilation ? run->job->dilation : TRACE_DILATION;
-    uint8_t *rows = calloc((size_t)w * h, 1);
-    if (!rows)
-        return false;
-    for (uint32_t pixel = 0; pixel < w * h; pixel++) {
-        uint8_t own = run->verdicts[pixel], left = pixel % w ? run->verdicts[pixel - 1] : own;
-        uint8_t above = pixel >= w ? run->verdicts[pixel - w] : own;
-        if (own != MIXED && !is_edge(own, left) && !is_edge(own, above))
-            continue;
-        uint32_t x = pixel % w, low = x > radius ? x - radius : 0;
-        uint32_t high = x + radius < w ? x + radius : w - 1;
-        memset(rows + pixel - x + low, 1, high - low + 1);
-    }
-    for (uint32_t y = 0; y < h; y++) {
-        uint32_t low = y > radius ? y - radius : 0, high = y + radius < h ? y + radius : h - 1;
-        for (uint32_t from = low; from <= high; from++)
-            for (uint32_t x = 0; x < w; x++)
-                run->full[(size_t)y * w + x] |= rows[(size_t)from * w + x];
-    }
-    free(rows);
-    return true;
+    const struct pen_trace_job *job = run->job;
+    uint32_t radius = job->dilation ? job->dilation : TRACE_DILATION;
+    return trace_verdicts_spread(run->verdicts, job->width, job->height, radius, run->full);
 }
 
 static bool check_job(
@@ -338,19 +446,78 @@ static bool over_tiles(
     return !atomic_load(&run->late);
 }
 
+/* All receivers have had so many samples. False when it is late. */
+static bool look_up(struct run *run, uint32_t threads, uint32_t taken, double *cpu_seconds)
+{
+    const struct pen_trace_job *job = run->job;
+    enum pen_trace_step step =
+        job->step ? job->step(job->turn_context, taken, run->samples) : PEN_TRACE_GO_ON;
+    if (step == PEN_TRACE_GO_ON)
+        return true;
+    run->taken = taken;
+    run->enough = step == PEN_TRACE_STOP;
+    if (!over_tiles(run, threads, estimate_tile, cpu_seconds) ||
+        (!run->enough && !job->show(job->turn_context)))
+        atomic_store(&run->late, true);
+    return !atomic_load(&run->late);
+}
+
 /* The adaptive mode's first half: settles what the pre-test settles and leaves the
  * rest in `full`. */
 static bool select_receivers(
     struct run *run, uint32_t threads, double *cpu_seconds, struct pen_error *error)
 {
     size_t count = (size_t)run->job->width * run->job->height;
+    /* What is coloured or weighted is not to be told from counts. */
+    bool early = run->job->step && run->mode == TRACE_COUNT_ONLY;
     run->verdicts = calloc(count, 1);
+    if (early && !(run->early = calloc(count, 1)))
+        return pen_fail(error, PEN_INTERNAL, "", "Out of memory.");
+    if (early && (!over_tiles(run, threads, early_tile, cpu_seconds) ||
+                     !look_up(run, threads, TRACE_PRETEST_FIRST, cpu_seconds) || run->enough))
+        return true;
     run->full = calloc(count, 1);
     if (!run->verdicts || !run->full)
         return pen_fail(error, PEN_INTERNAL, "", "Out of memory.");
-    if (over_tiles(run, threads, pretest_tile, cpu_seconds) && !dilate(run))
+    if (over_tiles(run, threads, pretest_tile, cpu_seconds) && !spread(run))
         return pen_fail(error, PEN_INTERNAL, "", "Out of memory.");
-    over_tiles(run, threads, settle_tile, cpu_seconds);
+    if (over_tiles(run, threads, settle_tile, cpu_seconds) && early)
+        look_up(run, threads, TRACE_PRETEST_NET, cpu_seconds);
+    return true;
+}
+
+/* Sums that last from block to block, if there is room. */
+static void make_sums(struct run *run)
+{
+    size_t count = (size_t)run->job->width * run->job->height;
+    bool plain = run->mode == TRACE_COUNT_ONLY;
+    size_t bytes = sizeof *run->counts + (plain ? 0 : sizeof *run->sums);
+    if (!run->job->step || run->points.block_count == 1 || count > SUMS_BYTES / bytes)
+        return;
+    run->counts = calloc(count, sizeof *run->counts);
+    run->sums = plain || !run->counts ? NULL : calloc(count, sizeof *run->sums);
+    if (plain || run->sums)
+        return;
+    free(run->counts);
+    run->counts = NULL;
+}
+
+/* All samples of who needs them: block by block, or each tile at once. */
+static bool sample_all(struct run *run, uint32_t threads, double *cpu_seconds)
+{
+    make_sums(run);
+    uint32_t blocks = run->counts ? run->points.block_count : 1;
+    run->taken = 0;
+    for (run->block = 0; run->block < blocks; run->block++) {
+        uint32_t end = run->taken + run->points.blocks[run->block].count;
+        if (!over_tiles(run, threads, sample_tile, cpu_seconds))
+            return false;
+        if (run->block + 1 < blocks && !look_up(run, threads, end, cpu_seconds))
+            return false;
+        if (run->enough)
+            return true;
+        run->taken = end;
+    }
     return true;
 }
 
@@ -381,8 +548,8 @@ bool pen_trace_visibility(struct pen_trace_scene *scene, const struct pen_trace_
     start = trace_seconds();
     run.emitter.scene = hierarchy->scene;
     if (!trace_emitter_average(&run.emitter, run.mean_emission, error) ||
-        !trace_points_make(&run.points, run.samples, job->target_error > 0,
-            run.emitter.type != PEN_TRACE_RECT, job->seed, error))
+        !trace_points_make(
+            &run.points, run.samples, run.emitter.type != PEN_TRACE_RECT, job->seed, error))
         goto fail;
     run.tile_height = job->height == 1 ? 1 : TILE;
     run.tile_width = job->height == 1 ? TILE_RECEIVERS : TILE;
@@ -393,7 +560,7 @@ bool pen_trace_visibility(struct pen_trace_scene *scene, const struct pen_trace_
     if (job->adaptive && run.samples > TRACE_PRETEST_NET + TRACE_PRETEST_RIM &&
         !select_receivers(&run, threads, &cpu_seconds, error))
         goto fail;
-    if (!over_tiles(&run, threads, sample_tile, &cpu_seconds)) {
+    if (!run.enough && !sample_all(&run, threads, &cpu_seconds)) {
         pen_fail(error, PEN_DEADLINE, "", "The deadline passed while rays were traced.");
         goto fail;
     }
@@ -416,5 +583,8 @@ fail:
     trace_points_finish(&run.points);
     free(run.verdicts);
     free(run.full);
+    free(run.early);
+    free(run.counts);
+    free(run.sums);
     return ok;
 }

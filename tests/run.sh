@@ -85,7 +85,7 @@ run_ctest() {
     local preset=$1 name=$2
     shift 2
     ctest --test-dir "build/$preset" --output-on-failure --output-junit "$PWD/$logs/$name.xml" \
-        -j "$jobs" --timeout 1200 "$@"
+        -j "$((jobs + 1))" --timeout 1200 "$@" # some only wait
 }
 export -f build run_ctest
 export jobs logs

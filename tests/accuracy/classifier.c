@@ -71,7 +71,7 @@ int main(int argc, char **argv)
             continue;
         }
         /* Tiles of a hill, whose skirts turn away from a light on the other side. */
-        compare(room, name, "width=320&height=240&light.type=sun&light.position=1,0.3,0.4");
+        compare(room, name, "width=240&height=180&light.type=sun&light.position=1,0.3,0.4");
         /* A floor that turns away from a light below it, without thickness. */
         compare(plane, name,
             HARNESS_VIEW "&light.type=rect&light.position=0.3,-3,0.2&light.target=0,0,0"
@@ -80,18 +80,18 @@ int main(int argc, char **argv)
         compare(plane, name,
             HARNESS_VIEW "&light.type=rect&light.position=3,-0.3,0.2&light.target=0,-0.3,0.2"
                          "&light.width=1&light.height=1");
-        compare(demo, name, "width=320&height=240&camera.index=0");
+        compare(demo, name, "width=240&height=180&camera.index=0");
         compare(demo, name,
-            "width=320&height=240&light.type=sun&light.angular_diameter_deg=4&light.position=1,2,"
+            "width=240&height=180&light.type=sun&light.angular_diameter_deg=4&light.position=1,2,"
             "1");
         /* Both have a cube of maps, most of whose tiles lie in one face. */
-        compare(demo, name, "width=320&height=240&light.type=sphere&light.position=1,3,1");
-        compare(demo, name, "width=320&height=240&light.type=point&light.position=0.3,1.2,0.8");
+        compare(demo, name, "width=240&height=180&light.type=sphere&light.position=1,3,1");
+        compare(demo, name, "width=240&height=180&light.type=point&light.position=0.3,1.2,0.8");
         compare(half, name, HARNESS_VIEW HARNESS_RECT);
         compare(half, name, HARNESS_VIEW HARNESS_DISK);
         /* A pyramid with odd levels, whose last one comes earlier than its side suggests. */
         if (pen_param_find(catalogue->items[i]->params, "map_size"))
-            compare(demo, name, "map_size=1000&width=320&height=240&camera.index=0");
+            compare(demo, name, "map_size=1000&width=240&height=180&camera.index=0");
     }
     if (argc < 2 || !strcmp(argv[1], "pcss")) {
         check_shares(half);

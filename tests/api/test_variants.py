@@ -128,13 +128,13 @@ class Variants(unittest.TestCase):
             own = tuple(o if m is None else m for o, m in zip(OWN, materials))
             alone = self.d.upload(scene(own=own, generator=name))
             for method in ["pcss", "raytraced"] + some[number::len(VARIANTS)]:
-                request = {"technique": {"name": method}, "antialias": 2}
+                request = {"technique": {"name": method}}
                 with self.subTest(variant=name, method=method):
                     a = self.picture(self.id, variant=name or number, **request)
                     self.assertEqual(off_by_more_than(a, self.picture(alone, **request), 0), 0)
                     shown.setdefault(method, []).append(a)
         for method in ("pcss", "raytraced"):  # and they do differ
-            own = self.picture(self.id, technique={"name": method}, antialias=2)
+            own = self.picture(self.id, technique={"name": method})
             self.assertEqual(off_by_more_than(own, shown[method][4], 0), 0)
             for a in shown[method][:4]:
                 self.assertGreater(off_by_more_than(own, a, 8), 100)

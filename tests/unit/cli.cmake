@@ -4,6 +4,6 @@ if(PENUMBRA_DAEMON)
     if(Python3_FOUND)
         add_test(NAME api.cli COMMAND ${Python3_EXECUTABLE}
             ${CMAKE_SOURCE_DIR}/tests/api/test_cli.py $<TARGET_FILE:penumbra>)
-        set_tests_properties(api.cli PROPERTIES LABELS "api;smoke" TIMEOUT 600 RESOURCE_LOCK gpu)
+        set_tests_properties(api.cli PROPERTIES LABELS "api;smoke" TIMEOUT 600 RESOURCE_LOCK waiting)
     endif()
 endif()

@@ -30,12 +30,14 @@ static bool starts_with(const char *text, const char *prefix)
 }
 
 /* A bare name that a field of the request has too is the method's when the value is one of the words
- * that the method's parameter knows. */
+ * that the method's parameter knows, or when it says how the answer is wanted. */
 static bool is_word_of_method(
     const struct pen_technique_info *info, const char *key, const char *value)
 {
     const struct pen_param *row = info ? pen_param_find(info->params, key) : NULL;
-    return row && row->choices && value && pen_choice_index(row->choices, value) >= 0;
+    if (row && !row->choices)
+        return pen_param_find(pen_delivery_table(), key) != NULL;
+    return row && value && pen_choice_index(row->choices, value) >= 0;
 }
 
 /* Writes the path in the JSON body that `key` is short for. */

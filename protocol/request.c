@@ -18,6 +18,7 @@ const char *const pen_tone_map_names[] = {
     NULL};
 const char *const pen_edges_names[] = {"smooth", "none", NULL};
 const char *const pen_casters_names[] = {"both", "front", NULL};
+const char *const pen_on_deadline_names[] = {"error", "best", NULL};
 const char *const pen_priority_names[] = {"interactive", "batch", NULL};
 const char *const pen_pattern_names[] = {
     "two-colour", "checker", "stained-glass", "star", "candle-flame", NULL};
@@ -102,7 +103,18 @@ static const struct pen_param output_rows[] = {
 #define DELIVERY(field, ...) PARAM(struct pen_delivery, field, __VA_ARGS__)
 static const struct pen_param delivery_rows[] = {
     DELIVERY(deadline_ms, .def = 30000, .min = 1, .max = 3600000, .unit = "ms",
-        .help = "The answer is 504 when it is not ready by then."),
+        .help = "When the answer is to be ready, counted from the request's last byte."),
+    DELIVERY(on_deadline, .def = PEN_DEADLINE_ERROR, .choices = pen_on_deadline_names,
+        .help =
+            "error: 504 when it is not. best: the picture reached by then, with the samples and "
+            "the standard error that it has in the record's `progress`; still 504 when there is "
+            "none yet, as with methods that take all their samples at once."),
+    DELIVERY(budget_ms, .def = 0, .min = 0, .max = 3600000, .unit = "ms",
+        .help =
+            "Time that the renderer spends on the picture, of methods that add sample to sample "
+            "and of jittered frames: what it has reached by then is the answer, and at least "
+            "the first samples. Waiting and other renders do not count. 0: all samples. In a "
+            "query, a method's own parameter of this name goes before."),
     DELIVERY(priority, .def = PEN_PRIORITY_INTERACTIVE, .choices = pen_priority_names,
         .help = "Interactive requests are taken first."),
 };
@@ -130,6 +142,11 @@ struct pen_param_table pen_output_table(void)
 struct pen_param_table pen_delivery_table(void)
 {
     return PEN_TABLE(delivery_rows);
+}
+
+bool pen_delivery_is_limited(const struct pen_delivery *delivery)
+{
+    return delivery->budget_ms || delivery->on_deadline == PEN_DEADLINE_BEST;
 }
 
 void pen_light_default(struct pen_light *light, enum pen_light_type type)

@@ -61,6 +61,7 @@ enum pen_edges { PEN_EDGES_SMOOTH, PEN_EDGES_NONE };
 enum pen_casters { PEN_CASTERS_BOTH, PEN_CASTERS_FRONT };
 enum pen_weighting { PEN_WEIGHT_AREA, PEN_WEIGHT_G };
 enum pen_priority { PEN_PRIORITY_INTERACTIVE, PEN_PRIORITY_BATCH };
+enum pen_on_deadline { PEN_DEADLINE_ERROR, PEN_DEADLINE_BEST };
 
 struct pen_output {
     uint32_t format;    /* enum pen_format */
@@ -69,9 +70,13 @@ struct pen_output {
     uint32_t quality;   /* 1 to 100, JPEG and lossy WebP */
 };
 
-struct pen_delivery { /* how the answer is wanted; no pixel depends on it */
+/* How the answer is wanted. No pixel of a complete picture depends on it; one that had to end before
+ * its last sample says so (struct pen_progress), and is nobody else's. */
+struct pen_delivery {
     uint32_t deadline_ms;
-    uint32_t priority; /* enum pen_priority */
+    uint32_t priority;    /* enum pen_priority */
+    uint32_t on_deadline; /* enum pen_on_deadline */
+    uint32_t budget_ms;   /* 0: none */
 };
 
 struct pen_request {
@@ -100,6 +105,7 @@ extern const char *const pen_tone_map_names[];
 extern const char *const pen_edges_names[];
 extern const char *const pen_casters_names[];
 extern const char *const pen_priority_names[];
+extern const char *const pen_on_deadline_names[];
 extern const char *const pen_pattern_names[]; /* built-in emission patterns */
 
 /* Rows of struct pen_request, pen_camera, pen_light, pen_output and pen_delivery.
@@ -119,6 +125,9 @@ void pen_light_default(struct pen_light *light, enum pen_light_type type);
 
 /* True when the picture has an alpha channel: how much of a pixel the scene covers. */
 bool pen_request_is_transparent(const struct pen_request *request);
+
+/* The time it may take ends it with the picture that it has reached. */
+bool pen_delivery_is_limited(const struct pen_delivery *delivery);
 
 /* Checks what no single row can: pixel budget, layer against format, light against emitter size,
  * degenerate camera, known technique. Errors: PEN_INVALID with a pointer. A worker calls it

@@ -449,6 +449,12 @@ void pen_render_watch(struct pen_render *render, const struct pen_viewer *viewer
     render->lane.job.viewer = *viewer;
 }
 
+void pen_render_limit(struct pen_render *render, double budget_ms, double until_ms)
+{
+    render->lane.job.budget_ms = budget_ms;
+    render->lane.job.until_ms = until_ms;
+}
+
 bool pen_render_advance(struct pen_render *render, double ms)
 {
     gl_targets_charge(&render->target_bytes);

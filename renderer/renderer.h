@@ -68,6 +68,9 @@ struct pen_render *pen_render_begin(struct pen_renderer *renderer,
     struct pen_error *error);
 /* Shows pictures so far to the viewer; before the first pen_render_advance. */
 void pen_render_watch(struct pen_render *render, const struct pen_viewer *viewer);
+/* Ends with the picture reached when it has had the renderer for so many ms, or at a time of the
+ * monotonic clock (ms); 0: no limit. Before the first pen_render_advance. */
+void pen_render_limit(struct pen_render *render, double budget_ms, double until_ms);
 /* Goes on for about so many ms, more where a piece cannot be cut. True when it has ended. */
 bool pen_render_advance(struct pen_render *render, double ms);
 /* As pen_renderer_render; one that has not ended gives up at once and fails with PEN_LOST. */

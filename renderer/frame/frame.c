@@ -213,9 +213,24 @@ static bool record_light(struct frame *f, uint32_t light, struct pen_error *erro
     return true;
 }
 
+/* The sky's shadow of this jittered frame. */
+static bool know_sky(struct frame *f, struct pen_error *error)
+{
+    const struct pen_request *r = f->job->request;
+    if (f->sky_known || !r->sky.on || !frame_needs(r, PEN_SOURCE_BEAUTY))
+        return true;
+    f->sky_known = true;
+    return sky_occlusion(f->job, error);
+}
+
 static bool record_visibility(struct frame *f, struct pen_error *error)
 {
     const struct frame_job *job = f->job;
+    /* What is left to do after the samples is to be small. */
+    if (frame_progress_is_limited(&f->progress) && !know_sky(f, error))
+        return false;
+    if (f->number == 0)
+        f->progress.ahead_ms = f->progress.step_ms = frame_progress_ms(&f->progress);
     gl.NamedBufferData(job->ctx->param_block, sizeof job->request->technique_params,
         job->request->technique_params, GL_STREAM_DRAW);
     for (uint32_t i = 0; i < f->light_count; i++) {
@@ -323,14 +338,6 @@ static bool add_visibility(struct frame *f, struct pen_error *error)
         error);
 }
 
-static bool shade_with_sky(struct frame *f, struct pen_error *error)
-{
-    if (f->job->request->sky.on && !f->sky_known && !sky_occlusion(f->job, error))
-        return false;
-    f->sky_known = true;
-    return shade(f, error);
-}
-
 /* The pass list. */
 static bool render_jittered(struct frame *f, uint32_t number, struct pen_error *error)
 {
@@ -343,7 +350,8 @@ static bool render_jittered(struct frame *f, uint32_t number, struct pen_error *
     return pass_gbuffer(f->job->ctx, f->job->scene, &f->view, r->ground.on,
                &f->job->targets->gbuffer, &f->triangles, error) &&
            (!frame_needs_shadows(r) || record_visibility(f, error)) &&
-           (!beauty || shade_with_sky(f, error)) && (!visibility || add_visibility(f, error));
+           (!beauty || (know_sky(f, error) && shade(f, error))) &&
+           (!visibility || add_visibility(f, error));
 }
 
 static bool show_frame(struct frame *f, uint32_t frames, struct pen_error *error)
@@ -369,8 +377,8 @@ static bool show_estimate(struct frame *f, struct pen_error *error)
     static const float zero[4] = {0};
     bool beauty = frame_needs(r, PEN_SOURCE_BEAUTY),
          visibility = frame_needs(r, PEN_SOURCE_VISIBILITY);
-    bool ok = (!beauty || shade_with_sky(f, error)) && (!visibility || add_visibility(f, error)) &&
-              show_frame(f, 1, error);
+    bool ok = (!beauty || (know_sky(f, error) && shade(f, error))) &&
+              (!visibility || add_visibility(f, error)) && show_frame(f, 1, error);
     if (beauty && !frame_output_is_direct(r))
         gl_target_clear(&t->beauty, zero);
     if (visibility)
@@ -388,6 +396,7 @@ static bool can_show_estimate(const struct pen_request *r)
 static enum technique_step on_step(struct technique_run *run, uint32_t done, uint32_t total)
 {
     struct frame *f = container_of(run->watch, struct frame, watch);
+    f->result->progress.done = done; /* something is there */
     return frame_progress_step(&f->progress, done, total);
 }
 
@@ -409,6 +418,7 @@ static bool look_up(struct frame *f, bool *enough, struct pen_error *error)
 {
     struct frame_progress *p = &f->progress;
     enum technique_step step = frame_progress_next(p);
+    f->result->progress.done = 1; /* something is there */
     *enough = step == STEP_STOP;
     if (step != STEP_SHOW)
         return true;
@@ -466,12 +476,20 @@ bool frame_render(const struct frame_job *job, struct pen_frame *frame, struct p
         }
         if (!render_jittered(&f, i, error) || !look_up(&f, &enough, error))
             goto done;
+        if (f.progress.late) {
+            pen_fail(
+                error, PEN_DEADLINE, "/deadline_ms", "Nothing of the image was ready in time.");
+            goto done;
+        }
     }
     if (f.progress.tracked && !frame_progress_compare(&f.progress, error))
         goto done;
-    if (!frame_output_read(job, &f.view, f.progress.frames, frame, error))
+    if (!frame_output_read(job, &f.view, f.progress.frames + !f.progress.frames, frame, error))
         goto done;
     frame_progress_tell(&f.progress, result);
+    if (f.progress.stopped)
+        pen_result_warn(result, "Its time was up: the picture rests on %u of %u samples.",
+            result->progress.done, result->progress.total);
     frame_layers_end(job, &f.work, f.classified, result);
     gl_timer_collect(&job->ctx->timer, result);
     result->shadow_inputs_reused = shadow_cache_all_reused(job->ctx);

@@ -14,5 +14,6 @@ struct frame_job {
     struct emission_cache *emissions;
     const struct scene *(*find_image)(void *owner, const struct pen_light *light);
     void *owner;
-    struct pen_viewer viewer; /* wants NULL: nobody watches */
+    struct pen_viewer viewer;   /* wants NULL: nobody watches */
+    double budget_ms, until_ms; /* see pen_render_limit */
 };

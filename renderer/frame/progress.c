@@ -7,11 +7,19 @@
 #define SHARED_ROWS "renderer/shaders/frame/progress.def"
 #include "renderer/shared/rows_c.h"
 
+#define LEAST_SHARE 0.03 /* of the render's time may go into estimates of its error */
+
 void frame_progress_begin(struct frame_progress *p, const struct frame_job *job, uint32_t lights)
 {
     *p = (struct frame_progress){
         .job = job, .lights = lights, .begun_ms = gl_now_ms(), .standard_error = -1, .total = 1};
-    p->tracked = job->viewer.wants && job->viewer.wants(job->viewer.context);
+    p->tracked = frame_progress_is_limited(p) ||
+                 (job->viewer.wants && job->viewer.wants(job->viewer.context));
+}
+
+bool frame_progress_is_limited(const struct frame_progress *p)
+{
+    return p->job->budget_ms > 0 || p->job->until_ms > 0;
 }
 
 double frame_progress_ms(const struct frame_progress *p)
@@ -26,15 +34,32 @@ void frame_progress_spent(struct frame_progress *p, double begin_ms)
     p->extra_ms += p->last_extra_ms;
 }
 
+/* The next batch is taken for half again as long as the last, and what is left to do of the picture
+ * for as long as all that came before the samples: geometry, and the sky's shadow. */
+static bool is_time_up(const struct frame_progress *p, double now)
+{
+    const struct frame_job *job = p->job;
+    double ahead = 1.5 * p->increment_ms + 1.2 * fmax(p->ahead_ms, p->last_extra_ms);
+    double wall = gl_now_ms(), others = (wall - p->begun_ms) / fmax(now, 1e-3);
+    return (job->budget_ms > 0 && now + ahead > job->budget_ms) ||
+           (job->until_ms > 0 && wall + ahead * fmax(others, 1) > job->until_ms);
+}
+
 /* An estimate of so many samples in all. */
 static enum technique_step step(struct frame_progress *p, uint32_t samples)
 {
     double now = frame_progress_ms(p);
     p->increment_ms = now - p->step_ms;
     p->step_ms = now;
+    p->stopped = is_time_up(p, now);
+    p->late = !p->begun && p->job->until_ms > 0 && gl_now_ms() > p->job->until_ms;
+    p->begun = true;
+    if (p->stopped)
+        return STEP_STOP;
     const struct pen_viewer *viewer = &p->job->viewer;
     bool first = !p->shown && !p->kept_done;
-    if (!first && p->extra_ms + p->last_extra_ms > viewer->share * now)
+    double share = fmax(viewer->share, LEAST_SHARE);
+    if (!first && p->extra_ms + p->last_extra_ms > share * now)
         return STEP_GO_ON;
     p->show_wanted = viewer->wants && viewer->wants(viewer->context);
     bool compare = p->tracked && samples >= 2 * p->kept_done;
@@ -50,6 +75,8 @@ enum technique_step frame_progress_step(struct frame_progress *p, uint32_t done,
 
 enum technique_step frame_progress_next(struct frame_progress *p)
 {
+    if (p->stopped)
+        return STEP_STOP;
     p->frames++;
     p->done = 0;
     return p->frames < p->job->request->antialias ? step(p, p->frames * p->total) : STEP_GO_ON;

@@ -7,7 +7,11 @@ struct frame_progress {
     const struct frame_job *job;
     uint32_t lights;
     bool tracked;         /* estimates of its error are wanted */
+    bool stopped;         /* before the last sample */
+    bool begun;           /* there is an estimate */
+    bool late;            /* there was none in time */
     double begun_ms;      /* gl_now_ms */
+    double ahead_ms;      /* of the render's own time, before the first sample */
     double extra_ms;      /* that pictures and estimates took, of the render's own time */
     double last_extra_ms; /* the last of them */
     double step_ms;       /* the render's time at the last step, */
@@ -23,6 +27,8 @@ struct frame_progress {
 };
 
 void frame_progress_begin(struct frame_progress *p, const struct frame_job *job, uint32_t lights);
+/* Somebody may want what is not complete. */
+bool frame_progress_is_limited(const struct frame_progress *p);
 /* What is to be done with an estimate from `done` of `total` samples of the frame at hand. */
 enum technique_step frame_progress_step(struct frame_progress *p, uint32_t done, uint32_t total);
 /* Another jittered frame is complete; STEP_STOP: there is no time for the next one. */

@@ -10,6 +10,9 @@
 
 #define BATCH_TURN 8 /* every eighth render may be a batch one, so that batches never starve */
 
+/* After the deadline, for a worker to finish what it has and to encode it. */
+#define BEST_GRACE_NS (20 * CLOCK_S)
+
 struct share {
     uint64_t client;
     uint32_t used;
@@ -199,6 +202,7 @@ bool scheduler_submit(struct scheduler *s, const struct pen_request *request,
             memcpy(render->key, key, PEN_ID_BYTES);
             render->measure = waiter->measure;
             render->client = waiter->client;
+            render->best_until_ns = waiter->best ? waiter->deadline_ns : 0;
             if (waiter->reference_fd > 0)
                 render->reference_fd = fcntl(waiter->reference_fd, F_DUPFD_CLOEXEC, 3);
             push_back(s, render);
@@ -398,9 +402,10 @@ static uint64_t collect(struct scheduler *s, struct render *list, uint64_t now, 
         struct waiter **at = &r->waiters;
         while (*at) {
             struct waiter *waiter = *at;
-            if (waiter->deadline_ns > now) {
-                if (waiter->deadline_ns < next)
-                    next = waiter->deadline_ns;
+            uint64_t deadline =
+                waiter->deadline_ns + (waiter->best && r->running ? BEST_GRACE_NS : 0);
+            if (deadline > now) {
+                next = deadline < next ? deadline : next;
                 at = &waiter->next;
                 continue;
             }

@@ -25,6 +25,7 @@ struct waiter {
     uint64_t client;                        /* whose share it uses; 0: nobody's */
     bool (*is_gone)(struct waiter *waiter); /* the client has hung up; may be NULL */
     void (*finish)(struct waiter *waiter, const struct outcome *outcome);
+    bool best;        /* at the deadline a worker that has begun with it gives what there is */
     uint32_t measure; /* enum measure; what is measured is never shared */
     int reference_fd; /* planes to compare with, needed until scheduler_submit returns; 0: none */
 };
@@ -37,6 +38,7 @@ struct render {
     struct waiter *waiters;
     uint64_t queued_ns, taken_ns;
     uint64_t last_deadline_ns;
+    uint64_t best_until_ns; /* of a waiter who takes what there is; 0: there is none */
     bool shareable, running, batch;
     uint32_t measure;
     int reference_fd;         /* the render's own; 0: none */

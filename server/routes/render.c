@@ -207,13 +207,16 @@ static enum step_end queue(struct call *call, struct pen_error *error)
     picture_key(&work->request, key);
     work->waiter = (struct waiter){.client = call->client,
         .deadline_ns = call->exchange->body_ns + work->request.delivery.deadline_ms * CLOCK_MS,
+        .best = work->request.delivery.on_deadline == PEN_DEADLINE_BEST,
         .is_gone = is_gone,
         .finish = finish};
+    /* What may end early suits nobody else. */
+    bool shareable = !wants_fresh(call) && !pen_delivery_is_limited(&work->request.delivery);
     work->holds_share = true; /* before another thread can complete the call */
     if (!work->is_deferred)
         http_defer(call->exchange);
-    if (scheduler_submit(call->service->scheduler, &work->request, key, !wants_fresh(call),
-            &work->waiter, error))
+    if (scheduler_submit(
+            call->service->scheduler, &work->request, key, shareable, &work->waiter, error))
         return STEP_OVER;
     work->holds_share = false;
     return STEP_FAILED;
@@ -235,7 +238,9 @@ static void add_picture_headers(struct call *call, double total_ms)
         pen_server_timing(result, total_ms, timing, sizeof timing);
     http_add_header(x, "Server-Timing", "%s", timing);
     http_add_header(x, "Vary", "Accept");
-    http_add_header(x, "Cache-Control", "no-cache"); /* keep it, but ask: a restart may change it */
+    /* Keep it, but ask: a restart may change it. What had to end early comes out otherwise each time. */
+    bool complete = result->progress.done >= result->progress.total;
+    http_add_header(x, "Cache-Control", complete ? "no-cache" : "no-store");
     if (*why)
         http_add_header(x, "X-Penumbra-Choice", "%s", why);
     if (*why && !work->choice.met)

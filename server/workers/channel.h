@@ -5,7 +5,7 @@
 #include "server/queue/measure.h"
 #include <stddef.h>
 
-#define CHANNEL_VERSION 5u
+#define CHANNEL_VERSION 6u
 #define CHANNEL_MAX_JOBS 8  /* that a worker has at a time, being encoded or not */
 #define CHANNEL_WORKER_FD 3 /* the worker's end */
 #define CHANNEL_MAX_FDS (2 + PEN_MAX_LIGHTS)
@@ -48,7 +48,8 @@ struct channel_warm {
 };
 struct channel_job {
     struct pen_request request;
-    uint64_t client; /* with whom its time on the device is shared; 0: a client of its own */
+    uint64_t best_until_ns; /* monotonic; not 0: what there is of the picture is wanted then */
+    uint64_t client;        /* with whom its time on the device is shared; 0: a client of its own */
     uint32_t image_count;
     uint32_t measure; /* enum measure */
     uint32_t parts;   /* 1: as if a CHANNEL_WANT followed */

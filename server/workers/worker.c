@@ -94,6 +94,7 @@ static struct worker_item *make_item(const struct channel_message *message)
     item->measure = job->measure;
     item->reference_fd = -1;
     item->part_wanted = job->parts != 0;
+    item->best_until_ns = job->best_until_ns;
     return item;
 }
 

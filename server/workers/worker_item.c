@@ -36,3 +36,10 @@ bool worker_item_hand_over(
     fds->fd[fds->count++] = fd;
     return true;
 }
+
+void worker_item_refuse_late(struct worker_item *item)
+{
+    struct pen_error *error = &item->message.result.error;
+    *error = (struct pen_error){0};
+    pen_fail(error, PEN_DEADLINE, "/deadline_ms", "Nothing of the image was ready in time.");
+}

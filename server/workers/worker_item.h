@@ -13,8 +13,12 @@ struct worker_item { /* allocated by the caller, freed by the encoder */
     struct pen_frame frame;
     float load_ms;
     bool was_resident;
-    bool part_wanted; /* a picture so far would be taken */
+    uint64_t best_until_ns; /* monotonic: what there is then is wanted; 0: the whole picture is */
+    bool part_wanted;       /* a picture so far would be taken */
 };
+
+/* Nothing of it was there when it was wanted. */
+void worker_item_refuse_late(struct worker_item *item);
 
 struct pen_bytes;
 /* Adds the bytes to the answer's descriptors, as a memfd that nobody can change any more. */

@@ -171,6 +171,7 @@ static bool dispatch(struct slot *slot, struct flight *flight, struct render *re
     message.job_data.request = render->request;
     message.job_data.measure = render->measure;
     message.job_data.client = render->client;
+    message.job_data.best_until_ns = render->best_until_ns;
     if (!pool->config.open_job(pool->config.context, &message.job_data, &fds, &outcome.error)) {
         channel_close_fds(&fds);
         worker_slot_finish(slot, flight, &outcome);

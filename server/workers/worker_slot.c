@@ -113,8 +113,11 @@ static void on_done(
     } else if (outcome.error.code == PEN_OK) {
         char tag[PEN_ID_HEX + 1];
         picture_tag(&flight->render->request, &result.device, tag);
-        outcome.picture =
-            fds->count == 1 ? picture_create(fds->fd[0], &result, tag, &outcome.error) : NULL;
+        /* One that had to end early is not what the request stands for. */
+        bool complete = result.progress.done >= result.progress.total;
+        outcome.picture = fds->count == 1 ? picture_create(fds->fd[0], &result,
+                                                complete ? tag : NULL, &outcome.error)
+                                          : NULL;
         if (!outcome.picture)
             pen_fail(&outcome.error, PEN_INTERNAL, "", "The worker handed over no image.");
         else

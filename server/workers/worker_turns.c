@@ -138,6 +138,9 @@ bool worker_turns_begin(struct worker_turns *t, const struct pen_request *reques
     uint64_t number = ++t->arrivals;
     if (item->measure == MEASURE_PICTURE)
         pen_render_watch(render, &(struct pen_viewer){wants_part, show_part, turn, PART_SHARE});
+    if (item->measure == MEASURE_PICTURE)
+        pen_render_limit(
+            render, request->delivery.budget_ms, (double)item->best_until_ns / CLOCK_MS);
     *turn = (struct turn){.turns = t,
         .render = render,
         .item = item,
@@ -194,7 +197,14 @@ struct worker_item *worker_turns_run(struct worker_turns *t)
     turn->ms += ms;
     c->used_ms += turn->batch ? BATCH_COST * ms : ms;
     c->last_ns = clock_now_ns();
-    return ended ? finish(t, turn) : NULL;
+    if (ended)
+        return finish(t, turn);
+    bool late = turn->item->best_until_ns && clock_now_ns() > turn->item->best_until_ns;
+    if (!late || turn->item->message.result.progress.done)
+        return NULL;
+    struct worker_item *item = finish(t, turn);
+    worker_item_refuse_late(item);
+    return item;
 }
 
 struct worker_item *worker_turns_cancel(struct worker_turns *t, uint64_t job)

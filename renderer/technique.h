@@ -84,6 +84,7 @@ struct technique_run {
     const void *params;     /* the method's own struct, also bound as UBO_PARAMS */
     void *state;            /* state_size bytes, zeroed when the renderer starts */
     GLuint vis_framebuffer; /* bound; pixels already 1; only this face's receivers may be written */
+    const struct gl_texture *vis;      /* what that holds: the layer of light_index */
     const struct gl_texture *emission; /* of the light, with mips, or ctx->white */
     struct pen_result *result;         /* warnings and counts */
     uint32_t width, height;            /* px of vis and G-buffer */

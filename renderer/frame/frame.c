@@ -181,6 +181,7 @@ static bool record_face(
         .params = job->request->technique_params,
         .state = job->technique_state,
         .vis_framebuffer = job->targets->vis.framebuffer,
+        .vis = &job->targets->vis.texture,
         .emission = emission ? &emission->texture : &ctx->white,
         .result = f->result,
         .width = job->request->width,

@@ -1,4 +1,6 @@
+#include "renderer/passes/draw/open_tiles.h"
 #include "renderer/passes/draw/screen.h"
+#include "renderer/passes/draw/tiles.h"
 #include "renderer/passes/map/depth_map.h"
 #include "renderer/passes/map/shadow_cache.h"
 #include "renderer/techniques/map_params.h"
@@ -17,12 +19,18 @@ static bool record(struct technique_run *run, struct pen_error *error)
 {
     const struct hard *params = run->params;
     const struct shadow_input *map = pass_caster_map(run, params->map_size, error);
-    run->bound.map_size = params->map_size;
-    run->bound.texels = 1;
-    return map && pass_screen(run,
-                      &(struct pass_screen){
-                          .name = "hard", .body = "hard.glsl", .shadow = &map->textures[0]},
-                      error);
+    if (!map)
+        return false;
+    const struct gl_texture *tiles;
+    struct pass_screen pass = {.name = "hard", .body = "hard.glsl", .shadow = &map->textures[0]};
+    struct pass_screen again = pass;
+    if (!pass_screen(run, &pass, error) || !pass_open_tiles(run, &tiles, error))
+        return false;
+    again.name = "hard contacts";
+    again.defines = "#define TOUCHED\n";
+    again.tiles = tiles;
+    again.tile_px = OPEN_TILE;
+    return pass_screen(run, &again, error);
 }
 
 const struct technique technique_hard = {

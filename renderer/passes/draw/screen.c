@@ -39,7 +39,7 @@ struct drawing {
     uint32_t width, height;
     bool add, least, mute;
     const struct gl_texture *tiles; /* NULL: all pixels */
-    int32_t tile_class;
+    int32_t tile_class, tile_px;
     struct pass_texture own[4]; /* what a method's pass always reads */
     uint32_t own_count;
     const struct pass_texture *textures;
@@ -83,7 +83,7 @@ static void draw_piece(const struct drawing *d, const struct pass_bands *bands)
     if (d->tiles) {
         GLsizei x = (GLsizei)d->tiles->width, y = (GLsizei)d->tiles->height;
         /* Whole tiles: a point whose centre is outside the viewport would be lost. */
-        gl.Viewport(0, 0, x * CLASSIFY_TILE, y * CLASSIFY_TILE);
+        gl.Viewport(0, 0, x * d->tile_px, y * d->tile_px);
         gl.Enable(GL_PROGRAM_POINT_SIZE);
         gl.DrawArrays(GL_POINTS, 0, x * y);
         gl.Disable(GL_PROGRAM_POINT_SIZE);
@@ -101,7 +101,7 @@ static bool draw(const struct drawing *d, struct pen_error *error)
     uint32_t turn = d->ctx->turns.number;
     bool more = true, ok = true;
     if (d->tiles)
-        gl.ProgramUniform2i(d->program, LOCATION_TILE, CLASSIFY_TILE, d->tile_class);
+        gl.ProgramUniform2i(d->program, LOCATION_TILE, d->tile_px, d->tile_class);
     bind(d);
     pass_bands_begin(d->ctx, &bands, d->width, d->height, FIRST_PIXELS);
     while (ok && more) {
@@ -124,6 +124,7 @@ bool pass_draw_tiles(struct technique_ctx *ctx, GLuint program, GLuint framebuff
                     .framebuffer = framebuffer,
                     .tiles = tiles,
                     .tile_class = tile_class,
+                    .tile_px = CLASSIFY_TILE,
                     .width = width,
                     .height = height,
                     .add = add},
@@ -158,6 +159,7 @@ bool pass_screen(struct technique_run *run, const struct pass_screen *pass, stru
         .least = pass->least,
         .tiles = pass->tiles,
         .tile_class = TILE_UNDECIDED,
+        .tile_px = pass->tile_px ? (int32_t)pass->tile_px : CLASSIFY_TILE,
         .textures = pass->textures,
         .texture_count = pass->texture_count};
     if (!d.program)

@@ -23,6 +23,7 @@ struct pass_screen {
     bool add;                       /* blends ONE, ONE instead of replacing */
     bool least;                     /* keeps the lesser of what is there and the new value */
     const struct gl_texture *tiles; /* of pass_classify: only undecided tiles are drawn; or NULL */
+    uint32_t tile_px;               /* of those; 0: CLASSIFY_TILE */
     const void *extra;              /* contents of the uniform block UBO_EXTRA, or NULL */
     uint32_t extra_bytes;
 };

@@ -112,6 +112,13 @@ char *pen_result_json(const struct pen_result *result, const struct pen_record_e
     pen_json_uint(&json, "rays", result->rays);
     pen_json_uint(&json, "shadow_maps", result->shadow_maps);
     write_progress(&json, &result->progress);
+    pen_json_object(&json, "renderer");
+    write_ms(&json, "used_ms", result->turns_ms);
+    if (result->estimate_ms >= 0)
+        write_ms(&json, "expected_ms", result->estimate_ms);
+    else
+        pen_json_null(&json, "expected_ms");
+    pen_json_end(&json);
     pen_json_uint(&json, "gpu_bytes", result->gpu_bytes);
     pen_json_end(&json);
     return pen_json_finish(&json, NULL);

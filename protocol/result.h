@@ -43,6 +43,14 @@ struct pen_comparison {
     uint64_t penumbra_pixels;                        /* 0.02 < reference < 0.98 */
 };
 
+/* Where a render is, for logs. */
+struct pen_place {
+    uint32_t turn;  /* how many it has had */
+    uint32_t frame; /* jittered, from 0 */
+    uint32_t light; /* of the frame, from 0 */
+    char pass[24];  /* the last that began, or "" */
+};
+
 /* How far a picture got; done == total: as far as it goes. */
 struct pen_progress {
     uint32_t number;      /* of the render's pictures, from 0; the last one counts too */
@@ -75,7 +83,8 @@ struct pen_result {
     uint64_t gpu_bytes;   /* resident scenes, images and shadow inputs */
     uint64_t image_bytes; /* encoded size */
     struct pen_progress progress;
-    double turns_ms; /* that it had the renderer for itself, one turn after the other */
+    double estimate_ms; /* what it was expected to take of the renderer; < 0: nothing was known */
+    double turns_ms;    /* that it had the renderer for itself, one turn after the other */
     struct pen_program_counts programs;
     struct pen_comparison comparison; /* all 0 unless a reference was given */
 };

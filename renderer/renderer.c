@@ -463,6 +463,16 @@ bool pen_render_advance(struct pen_render *render, double ms)
     return ended;
 }
 
+struct pen_place pen_render_place(const struct pen_render *render)
+{
+    const struct technique_ctx *ctx = &render->lane.ctx;
+    const struct technique_turns *turns = &ctx->turns;
+    struct pen_place place = {turns->number, turns->frame, turns->light, ""};
+    if (ctx->timer.count)
+        memcpy(place.pass, ctx->timer.passes[ctx->timer.count - 1].name, sizeof place.pass);
+    return place;
+}
+
 bool pen_render_end(struct pen_render *render, struct pen_error *error)
 {
     struct pen_renderer *r = render->renderer;

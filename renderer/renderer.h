@@ -73,6 +73,7 @@ void pen_render_watch(struct pen_render *render, const struct pen_viewer *viewer
 void pen_render_limit(struct pen_render *render, double budget_ms, double until_ms);
 /* Goes on for about so many ms, more where a piece cannot be cut. True when it has ended. */
 bool pen_render_advance(struct pen_render *render, double ms);
+struct pen_place pen_render_place(const struct pen_render *render);
 /* As pen_renderer_render; one that has not ended gives up at once and fails with PEN_LOST. */
 bool pen_render_end(struct pen_render *render, struct pen_error *error);
 /* Forgets every shadow input, so that the next render pays for its own. */

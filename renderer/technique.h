@@ -24,6 +24,7 @@ struct technique_turns {
     double since_ms;        /* when this one began; gl_now_ms */
     double used_ms;         /* that those before it took */
     uint32_t number;
+    uint32_t frame, light; /* that it is at */
     bool cancelled;
     bool held;    /* what is under way must not be interrupted */
     GLsync fence; /* of the last piece but one */

@@ -284,8 +284,10 @@ struct service *service_create(
     pen_id_to_hex(digest, s->openapi_tag);
     if (!make_canary(s, error) || !(s->store = scene_store_open(config->store, error)))
         goto fail;
-    struct scheduler_limits limits = {
-        (uint32_t)config->queue_limit, (uint32_t)config->client_share, (uint32_t)config->workers};
+    struct scheduler_limits limits = {.queue = (uint32_t)config->queue_limit,
+        .client_share = (uint32_t)config->client_share,
+        .workers = (uint32_t)config->workers,
+        .catalogue = catalogue};
     s->metrics = metrics_create(catalogue);
     s->cache = result_cache_create(config->result_cache.bytes);
     s->scheduler = scheduler_create(&limits, on_work, s);

@@ -235,6 +235,7 @@ static bool record_visibility(struct frame *f, struct pen_error *error)
     gl.NamedBufferData(job->ctx->param_block, sizeof job->request->technique_params,
         job->request->technique_params, GL_STREAM_DRAW);
     for (uint32_t i = 0; i < f->light_count; i++) {
+        job->ctx->turns.light = i;
         gl_target_aim(&job->targets->vis, 0, i);
         /* What an unshadowed receiver sees. */
         gl_target_clear(&job->targets->vis, f->lights[i].faces[0].emission_mean);
@@ -345,7 +346,7 @@ static bool render_jittered(struct frame *f, uint32_t number, struct pen_error *
     const struct pen_request *r = f->job->request;
     bool beauty = frame_needs(r, PEN_SOURCE_BEAUTY),
          visibility = frame_needs(r, PEN_SOURCE_VISIBILITY);
-    f->number = number;
+    f->number = f->job->ctx->turns.frame = number;
     f->sky_known = false;
     upload_view(f, number);
     return pass_gbuffer(f->job->ctx, f->job->scene, &f->view, r->ground.on,

@@ -60,7 +60,8 @@ static const struct row rows[] = {
         .help = "Renders that one client may have under way; beyond it 429. 0: no limit."),
     ROW(result_cache, "256M", SIZE, .help = "Memory for encoded images; 0: keep none."),
     ROW(hang_timeout_ms, "60000", TIME,
-        .help = "A worker that has work and gives no sign of life for so long is replaced."),
+        .help = "A worker that has work and gives no sign of life for so long is replaced, or "
+                "sooner (10 s) when that is far longer than it ever took."),
     ROW(canary_interval_ms, "5000", TIME, .help = "How long /readyz trusts its last test render."),
     ROW(quarantine_s, "600", .form = "SECONDS", .max = 86400,
         .help = "How long a scene that ended two workers is refused."),

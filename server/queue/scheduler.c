@@ -1,32 +1,32 @@
 #include "server/queue/scheduler.h"
 #include "protocol/memory.h"
 #include "server/base/clock.h"
+#include "server/queue/shares.h"
 #include <fcntl.h>
 #include <math.h>
 #include <pthread.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
-#define BATCH_TURN 8 /* every eighth render may be a batch one, so that batches never starve */
-
 /* After the deadline, for a worker to finish what it has and to encode it. */
 #define BEST_GRACE_NS (20 * CLOCK_S)
 
-struct share {
-    uint64_t client;
-    uint32_t used;
-};
+#define MOST_RETRY_S 600
+/* A render of the same place goes first when its client has not had so much more than who is next,
+ * and nobody is passed more often. */
+#define SAME_PLACE_MS 250.0
+#define SAME_PLACE_PASSES 8
 
 struct scheduler {
-    pthread_mutex_t lock;       /* guards everything below, and the waiters of every render */
-    struct render *queue[2][2]; /* [batch][first, last] */
+    pthread_mutex_t lock;    /* guards everything below, and the waiters of every render */
+    struct render *queue[2]; /* first, last */
     struct render *running;
-    struct share *shares;
-    uint32_t share_count;
-    size_t share_capacity;
+    struct shares *shares;
     uint64_t next_id;
-    uint32_t turn;
+    struct accounts *accounts;
+    struct estimates *estimates;
     double mean_ms; /* of a render on a worker, decaying */
     struct scheduler_numbers numbers;
     /* Constant after creation. */
@@ -41,6 +41,11 @@ struct scheduler *scheduler_create(
     struct scheduler *s = pen_alloc_zero(1, sizeof *s);
     pthread_mutex_init(&s->lock, NULL);
     s->limits = *limits;
+    if (!s->limits.now_ns)
+        s->limits.now_ns = clock_now_ns;
+    s->shares = shares_create();
+    s->accounts = accounts_create();
+    s->estimates = estimates_create(limits->catalogue);
     s->on_work = on_work;
     s->context = context;
     s->mean_ms = 50;
@@ -52,33 +57,72 @@ void scheduler_destroy(struct scheduler *s)
     if (!s)
         return;
     pthread_mutex_destroy(&s->lock);
-    free(s->shares);
+    accounts_destroy(s->accounts);
+    estimates_destroy(s->estimates);
+    shares_destroy(s->shares);
     free(s);
 }
 
+/* What a render will still take of the renderer; of one without an estimate `unknown_ms`. */
+static double left_ms(const struct scheduler *s, const struct render *r, double unknown_ms)
+{
+    double ms = r->estimate.ms < 0 ? unknown_ms : r->estimate.ms;
+    if (r->running) /* at most: it shared the renderer with the others */
+        ms -= clock_ms(s->limits.now_ns() - r->taken_ns) / fmax(1, s->numbers.running);
+    return fmax(0, ms);
+}
+
+/* Everything that is there, on all workers together. */
+static double backlog_ms(const struct scheduler *s, double unknown_ms)
+{
+    double ms = 0;
+    for (const struct render *r = s->queue[0]; r; r = r->next)
+        ms += left_ms(s, r, unknown_ms);
+    for (const struct render *r = s->running; r; r = r->next)
+        ms += left_ms(s, r, unknown_ms);
+    return ms / fmax(1, s->limits.workers);
+}
+
+static uint32_t whole_seconds(double ms)
+{
+    return (uint32_t)fmin(MOST_RETRY_S, fmax(1, ceil(ms / 1e3)));
+}
+
+/* When about half of what is there is done. */
 static uint32_t retry_after(const struct scheduler *s)
 {
-    double seconds = s->mean_ms * (s->numbers.queued + 1) / fmax(1, s->limits.workers) / 1e3;
-    return (uint32_t)fmin(60, fmax(1, ceil(seconds)));
+    return whole_seconds(backlog_ms(s, s->mean_ms) / 2);
 }
 
-static struct share *find_share(struct scheduler *s, uint64_t client)
+/* How long a new render will wait at least. As all are served in turn, no other client is in its way
+ * for longer than its own renders take, times what the other's time counts less; of its own client's
+ * those that are queued come first, and those that run give way until it has had as much. Only what
+ * is known counts, and as far as it is sure. */
+static double wait_ms(const struct scheduler *s, uint64_t payer, bool batch, double own_ms)
 {
-    for (uint32_t i = 0; i < s->share_count; i++)
-        if (s->shares[i].client == client)
-            return &s->shares[i];
-    return NULL;
-}
-
-static void use_share(struct scheduler *s, uint64_t client)
-{
-    struct share *share = find_share(s, client);
-    if (!share) {
-        s->shares = pen_grow(s->shares, &s->share_capacity, s->share_count + 1, sizeof *s->shares);
-        share = &s->shares[s->share_count++];
-        *share = (struct share){.client = client};
+    const struct render *lists[] = {s->queue[0], s->running};
+    double mine = own_ms, ms = 0;
+    for (struct account *a = accounts_first(s->accounts); a; a = a->next)
+        a->backlog_ms = 0;
+    for (int l = 0; l < 2; l++)
+        for (const struct render *r = lists[l]; r; r = r->next) {
+            double left = r->estimate.sure * left_ms(s, r, 0);
+            bool own = r->payer == payer && r->batch == batch;
+            if (own) {
+                left = r->running ? fmin(left, own_ms) : left;
+                ms += left;
+                mine += r->running ? 0 : left;
+            } else {
+                r->account->backlog_ms += left;
+            }
+        }
+    for (struct account *a = accounts_first(s->accounts); a; a = a->next) {
+        double times = a->batch == batch ? 1
+                       : batch           ? ACCOUNTS_BATCH_COST
+                                         : 1 / ACCOUNTS_BATCH_COST;
+        ms += fmin(a->backlog_ms, times * mine);
     }
-    share->used++;
+    return ms / fmax(1, s->limits.workers);
 }
 
 void scheduler_release(struct scheduler *s, uint64_t client)
@@ -86,45 +130,41 @@ void scheduler_release(struct scheduler *s, uint64_t client)
     if (!client)
         return;
     pthread_mutex_lock(&s->lock);
-    struct share *share = find_share(s, client);
-    if (share && --share->used == 0)
-        *share = s->shares[--s->share_count];
+    shares_release(s->shares, client);
     pthread_mutex_unlock(&s->lock);
 }
 
 static void push_back(struct scheduler *s, struct render *render)
 {
-    struct render **queue = s->queue[render->batch];
     render->next = NULL;
-    if (queue[1])
-        queue[1]->next = render;
+    if (s->queue[1])
+        s->queue[1]->next = render;
     else
-        queue[0] = render;
-    queue[1] = render;
+        s->queue[0] = render;
+    s->queue[1] = render;
     s->numbers.queued++;
 }
 
 static void push_front(struct scheduler *s, struct render *render)
 {
-    struct render **queue = s->queue[render->batch];
-    render->next = queue[0];
-    queue[0] = render;
-    if (!queue[1])
-        queue[1] = render;
+    render->next = s->queue[0];
+    s->queue[0] = render;
+    if (!s->queue[1])
+        s->queue[1] = render;
     s->numbers.queued++;
 }
 
 static void unlink_queued(struct scheduler *s, struct render *render)
 {
-    struct render **queue = s->queue[render->batch], *before = NULL;
-    for (struct render *at = queue[0]; at != render; at = at->next)
+    struct render *before = NULL;
+    for (struct render *at = s->queue[0]; at != render; at = at->next)
         before = at;
     if (before)
         before->next = render->next;
     else
-        queue[0] = render->next;
-    if (queue[1] == render)
-        queue[1] = before;
+        s->queue[0] = render->next;
+    if (s->queue[1] == render)
+        s->queue[1] = before;
     s->numbers.queued--;
 }
 
@@ -137,6 +177,13 @@ static void unlink_running(struct scheduler *s, struct render *render)
     s->numbers.running--;
 }
 
+/* Of one that is in no list any more: it took `ms` of the renderer. With the lock held. */
+static void settle(struct scheduler *s, struct render *render, double ms)
+{
+    accounts_charge(s->accounts, render->account, ms - render->charged_ms);
+    accounts_leave(s->accounts, render->account, s->limits.now_ns());
+}
+
 static void free_render(struct render *render)
 {
     if (render && render->reference_fd > 0)
@@ -146,8 +193,8 @@ static void free_render(struct render *render)
 
 static struct render *find_key(struct scheduler *s, const uint8_t key[PEN_ID_BYTES])
 {
-    struct render *lists[] = {s->queue[0][0], s->queue[1][0], s->running};
-    for (int l = 0; l < 3; l++)
+    struct render *lists[] = {s->queue[0], s->running};
+    for (int l = 0; l < 2; l++)
         for (struct render *r = lists[l]; r; r = r->next)
             if (r->shareable && !memcmp(r->key, key, PEN_ID_BYTES))
                 return r;
@@ -163,55 +210,97 @@ static void attach(struct scheduler *s, struct render *render, struct waiter *wa
     s->numbers.waiting++;
 }
 
+/* What comes first leaves too little of the time that the waiter has: *error says so. A render that
+ * takes too long even alone is let in: its estimate may be wrong. */
+static bool is_late(const struct scheduler *s, const struct render *render, uint64_t payer,
+    const struct waiter *waiter, struct pen_error *error)
+{
+    uint64_t now = s->limits.now_ns();
+    double left = waiter->deadline_ns > now ? clock_ms(waiter->deadline_ns - now) : 0;
+    double own =
+        render->estimate.ms < 0 || waiter->best ? 0 : render->estimate.sure * render->estimate.ms;
+    double wait = wait_ms(s, payer, render->batch, own), over = wait + fmin(own, left / 2) - left;
+    if (!(wait > 0 && over > 0))
+        return false;
+    pen_fail(error, PEN_UNAVAILABLE, "/deadline_ms",
+        "What was asked for before takes about %.1f s: the image would not be ready in time.",
+        wait / 1e3);
+    error->retry_after_s = whole_seconds(over);
+    return true;
+}
+
+static void set_up(struct render *render, const struct pen_request *request,
+    const struct waiter *waiter, struct estimate estimate)
+{
+    render->request = *request;
+    render->batch = request->delivery.priority == PEN_PRIORITY_BATCH;
+    render->measure = waiter->measure;
+    snprintf(render->request_id, sizeof render->request_id, "%s",
+        waiter->request_id ? waiter->request_id : "");
+    render->estimate = estimate;
+    if (request->delivery.budget_ms)
+        render->estimate.ms = fmin(estimate.ms, request->delivery.budget_ms);
+    render->place = picture_place(request);
+}
+
+static void enter(struct scheduler *s, struct render *render, uint64_t payer)
+{
+    uint64_t now = s->limits.now_ns();
+    if (render->account)
+        accounts_leave(s->accounts, render->account, now);
+    render->payer = payer;
+    render->account = accounts_enter(s->accounts, payer, render->batch, now);
+}
+
 bool scheduler_submit(struct scheduler *s, const struct pen_request *request,
     const uint8_t key[PEN_ID_BYTES], bool shareable, struct waiter *waiter, struct pen_error *error)
 {
     bool batch = request->delivery.priority == PEN_PRIORITY_BATCH;
+    uint64_t payer = waiter->payer ? waiter->payer : waiter->client;
     struct render *fresh = pen_alloc_zero(1, sizeof *fresh);
     pthread_mutex_lock(&s->lock);
-    struct share *share = find_share(s, waiter->client);
+    set_up(fresh, request, waiter, estimates_of(s->estimates, request, s->limits.now_ns()));
+    uint32_t held = waiter->client ? shares_held(s->shares, waiter->client) : 0;
     struct render *render = shareable ? find_key(s, key) : NULL;
     if (s->numbers.draining) {
         pen_fail(error, PEN_UNAVAILABLE, "", "The service is shutting down.");
-    } else if (waiter->client && s->limits.client_share && share &&
-               share->used >= s->limits.client_share) {
+    } else if (s->limits.client_share && held >= s->limits.client_share) {
         s->numbers.refused_share++;
-        pen_fail(
-            error, PEN_TOO_MANY, "", "This client already has %u renders under way.", share->used);
+        pen_fail(error, PEN_TOO_MANY, "", "This client already has %u renders under way.", held);
     } else if (!render && s->numbers.queued >= s->limits.queue) {
         s->numbers.refused_full++;
         pen_fail(error, PEN_UNAVAILABLE, "", "The queue is full.");
+    } else if (!render && is_late(s, fresh, payer, waiter, error)) {
+        s->numbers.refused_late++;
     } else {
         if (waiter->client)
-            use_share(s, waiter->client);
+            shares_use(s->shares, waiter->client);
         if (render) {
             s->numbers.shared++;
             if (!batch && render->batch && !render->running) {
                 unlink_queued(s, render);
                 render->batch = false;
+                enter(s, render, payer);
                 push_back(s, render);
             }
         } else {
             render = fresh;
             fresh = NULL;
             render->id = ++s->next_id;
-            render->request = *request;
             render->shareable = shareable;
-            render->batch = batch;
-            render->queued_ns = clock_now_ns();
+            render->queued_ns = s->limits.now_ns();
             memcpy(render->key, key, PEN_ID_BYTES);
-            render->measure = waiter->measure;
-            render->client = waiter->client;
             render->best_until_ns = waiter->best ? waiter->deadline_ns : 0;
             if (waiter->reference_fd > 0)
                 render->reference_fd = fcntl(waiter->reference_fd, F_DUPFD_CLOEXEC, 3);
+            enter(s, render, payer);
             push_back(s, render);
         }
         attach(s, render, waiter);
         render = NULL;
         error = NULL;
     }
-    if (error)
+    if (error && !error->retry_after_s)
         error->retry_after_s = retry_after(s);
     pthread_mutex_unlock(&s->lock);
     free(fresh);
@@ -267,25 +356,36 @@ static bool is_barred(const struct barred *barred, const struct render *render)
     return false;
 }
 
-/* The first of a queue that fits; NULL: none. *nothing: nor may any other be taken. */
-static struct render *first_fit(
-    const struct scheduler *s, bool batch, const struct taker *taker, bool *nothing)
+static bool comes_before(const struct render *a, const struct render *b)
+{
+    double used[] = {a->account->used_ms, b->account->used_ms};
+    return used[0] != used[1] ? used[0] < used[1] : b->batch && !a->batch;
+}
+
+/* Who is next; NULL: nobody. */
+static struct render *choose(const struct scheduler *s, const struct taker *taker)
 {
     struct barred barred = {0};
-    struct render *render = s->queue[batch][0];
-    for (; render; render = render->next) {
-        if (is_barred(&barred, render))
+    struct render *best = NULL, *alike = NULL;
+    for (struct render *r = s->queue[0]; r; r = r->next) {
+        if (is_barred(&barred, r))
             continue;
-        enum take take = taker->fits(taker->context, render);
-        if (take == TAKE_FITS)
-            break;
-        *nothing |= take == TAKE_NOTHING;
-        if (*nothing)
+        enum take take = taker->fits(taker->context, r);
+        if (take == TAKE_NOTHING)
             return NULL;
         if (take == TAKE_SCENE_LATER && barred.count < MOST_BARRED)
-            barred.scenes[barred.count++] = render->request.scene;
+            barred.scenes[barred.count++] = r->request.scene;
+        if (take != TAKE_FITS)
+            continue;
+        if (!best || comes_before(r, best))
+            best = r;
+        if (r->place == taker->place && (!alike || comes_before(r, alike)))
+            alike = r;
     }
-    return render;
+    bool same = alike && alike != best && alike->batch == best->batch &&
+                alike->account->used_ms - best->account->used_ms < SAME_PLACE_MS &&
+                best->passed < SAME_PLACE_PASSES;
+    return same ? alike : best;
 }
 
 /* Of a render that runs, answers the waiters whose clients are gone. True when others are left. */
@@ -308,37 +408,37 @@ static bool keep_wanted(struct scheduler *s, struct render *render)
     return render->waiters != NULL;
 }
 
-/* Those before it that did not fit have been passed. */
-static void count_passed(struct scheduler *s, const struct render *taken)
+/* The account pays beforehand what it is expected to, so that not all that one client has queued is
+ * taken before anybody knows what it costs. */
+static void start(struct scheduler *s, struct render *render)
 {
-    for (struct render *r = s->queue[taken->batch][0]; r != taken; r = r->next)
+    for (struct render *r = s->queue[0]; r != render; r = r->next)
         r->passed++;
+    unlink_queued(s, render);
+    render->running = true;
+    render->taken_ns = s->limits.now_ns();
+    render->charged_ms = render->estimate.ms < 0 ? s->mean_ms : render->estimate.ms;
+    accounts_charge(s->accounts, render->account, render->charged_ms);
+    render->next = s->running;
+    s->running = render;
+    s->numbers.running++;
 }
 
 struct render *scheduler_take(struct scheduler *s, const struct taker *taker)
 {
     for (;;) {
         pthread_mutex_lock(&s->lock);
-        bool nothing = false;
-        struct render *interactive = first_fit(s, false, taker, &nothing);
-        struct render *batch = nothing ? NULL : first_fit(s, true, taker, &nothing);
-        bool turn = s->turn % BATCH_TURN == BATCH_TURN - 1;
-        struct render *render = batch && (!interactive || turn) ? batch : interactive;
+        struct render *render = choose(s, taker);
         if (!render) {
             pthread_mutex_unlock(&s->lock);
             return NULL;
         }
-        s->turn++;
-        count_passed(s, render);
-        unlink_queued(s, render);
-        render->running = true;
-        render->taken_ns = clock_now_ns();
-        render->next = s->running;
-        s->running = render;
-        s->numbers.running++;
+        start(s, render);
         bool wanted = keep_wanted(s, render);
-        if (!wanted)
+        if (!wanted) {
             unlink_running(s, render);
+            settle(s, render, 0);
+        }
         pthread_mutex_unlock(&s->lock);
         if (wanted)
             return render;
@@ -362,8 +462,13 @@ void scheduler_return(struct scheduler *s, struct render *render)
     unlink_running(s, render);
     render->running = false;
     bool wanted = render->waiters != NULL;
-    if (wanted)
+    if (wanted) {
+        accounts_charge(s->accounts, render->account, -render->charged_ms);
+        render->charged_ms = 0;
         push_front(s, render);
+    } else {
+        settle(s, render, 0);
+    }
     pthread_mutex_unlock(&s->lock);
     if (wanted)
         s->on_work(s->context);
@@ -381,13 +486,19 @@ void scheduler_finish(struct scheduler *s, struct render *render, const struct o
     for (struct waiter *w = waiters; w; w = w->next)
         count++;
     s->numbers.waiting -= count;
-    double ms = clock_ms(clock_now_ns() - render->taken_ns);
-    if (answer.error.code == PEN_OK)
+    double turns_ms = outcome->result ? outcome->result->turns_ms : 0;
+    double ms = turns_ms > 0 ? turns_ms : clock_ms(s->limits.now_ns() - render->taken_ns);
+    bool ok = answer.error.code == PEN_OK, given_up = answer.error.code == PEN_LOST;
+    if (ok)
         s->mean_ms += 0.1 * (ms - s->mean_ms);
-    if (answer.error.code != PEN_OK)
+    if (ok || given_up)
+        estimates_learn(s->estimates, &render->request, ms / picture_share(outcome->result), ok,
+            s->limits.now_ns());
+    settle(s, render, ms);
+    if (!ok)
         answer.error.retry_after_s = retry_after(s);
+    answer.run_ms = clock_ms(s->limits.now_ns() - render->taken_ns);
     pthread_mutex_unlock(&s->lock);
-    answer.run_ms = ms;
     answer.queue_ms = clock_ms(render->taken_ns - render->queued_ns);
     answer.shared = count > 1;
     answer_all(waiters, &answer);
@@ -421,15 +532,14 @@ static uint64_t collect(struct scheduler *s, struct render *list, uint64_t now, 
 /* Frees queued renders that nobody waits for any more. */
 static void prune(struct scheduler *s)
 {
-    for (int b = 0; b < 2; b++) {
-        struct render *next;
-        for (struct render *r = s->queue[b][0]; r; r = next) {
-            next = r->next;
-            if (r->waiters)
-                continue;
-            unlink_queued(s, r);
-            free_render(r);
-        }
+    struct render *next;
+    for (struct render *r = s->queue[0]; r; r = next) {
+        next = r->next;
+        if (r->waiters)
+            continue;
+        unlink_queued(s, r);
+        settle(s, r, 0);
+        free_render(r);
     }
 }
 
@@ -438,8 +548,8 @@ static uint64_t end_overdue(struct scheduler *s, uint64_t now, struct outcome *o
     struct waiter *overdue = NULL;
     uint64_t next = UINT64_MAX;
     pthread_mutex_lock(&s->lock);
-    struct render *lists[] = {s->queue[0][0], s->queue[1][0], s->running};
-    for (int l = 0; l < 3; l++) {
+    struct render *lists[] = {s->queue[0], s->running};
+    for (int l = 0; l < 2; l++) {
         uint64_t earliest = collect(s, lists[l], now, &overdue);
         next = earliest < next ? earliest : next;
     }
@@ -457,7 +567,7 @@ uint64_t scheduler_expire(struct scheduler *s)
 {
     struct outcome outcome = {0};
     pen_fail(&outcome.error, PEN_DEADLINE, "/deadline_ms", "The image was not ready in time.");
-    return end_overdue(s, clock_now_ns(), &outcome);
+    return end_overdue(s, s->limits.now_ns(), &outcome);
 }
 
 void scheduler_drain(struct scheduler *s)
@@ -479,5 +589,7 @@ void scheduler_read(struct scheduler *s, struct scheduler_numbers *numbers)
     pthread_mutex_lock(&s->lock);
     *numbers = s->numbers;
     numbers->full = s->numbers.queued >= s->limits.queue;
+    numbers->backlog_ms = backlog_ms(s, 0);
+    numbers->estimates = estimates_count(s->estimates);
     pthread_mutex_unlock(&s->lock);
 }

@@ -2,6 +2,8 @@
  * that asks for the same picture at the same time waits on the same render. */
 #pragma once
 #include "protocol/request.h"
+#include "server/queue/accounts.h"
+#include "server/queue/estimates.h"
 #include "server/queue/measure.h"
 #include "server/store/picture.h"
 
@@ -23,6 +25,8 @@ struct waiter {
     struct waiter *next;
     uint64_t deadline_ns;                   /* monotonic */
     uint64_t client;                        /* whose share it uses; 0: nobody's */
+    uint64_t payer;                         /* whose time it takes; 0: the client's */
+    const char *request_id;                 /* for the log; NULL: none; copied */
     bool (*is_gone)(struct waiter *waiter); /* the client has hung up; may be NULL */
     void (*finish)(struct waiter *waiter, const struct outcome *outcome);
     bool best;        /* at the deadline a worker that has begun with it gives what there is */
@@ -43,7 +47,12 @@ struct render {
     uint32_t measure;
     int reference_fd;         /* the render's own; 0: none */
     uint32_t attempts, kills; /* kept by the worker pool */
-    uint64_t client;          /* of the one who asked first */
+    char request_id[33];      /* of the one who asked first, as is: */
+    uint64_t payer;           /* whose time it takes */
+    struct account *account;
+    struct estimate estimate; /* of when it was asked for */
+    double charged_ms;        /* to the account, before the time is known */
+    uint64_t place;           /* what of the scene and its lights can be used again; see taker */
     uint32_t passed;          /* how often one behind it was taken while it could not be */
     /* Of a worker that had no room for it: which, and how many renders had ended there. */
     uint32_t busy_worker;
@@ -52,6 +61,8 @@ struct render {
 
 struct scheduler_limits {
     uint32_t queue, client_share, workers;
+    const struct pen_catalogue *catalogue; /* for estimates; may be NULL */
+    uint64_t (*now_ns)(void);              /* NULL: clock_now_ns */
 };
 struct scheduler;
 /* `on_work(context)` is called, with no lock held, whenever there is something to take. */
@@ -60,8 +71,8 @@ struct scheduler *scheduler_create(
 void scheduler_destroy(struct scheduler *scheduler); /* nothing may be queued or running */
 
 /* Queues a request, or joins one that is queued or running when `shareable`. Errors, with the
- * waiter untouched: PEN_TOO_MANY (share used up), PEN_UNAVAILABLE (full or draining), both with
- * retry_after_s. A success uses one unit of the client's share until scheduler_release. */
+ * waiter untouched: PEN_TOO_MANY (share used up), PEN_UNAVAILABLE (full, draining, or what comes
+ * first is known to take longer than the deadline leaves), with retry_after_s. A success uses one unit of the client's share until scheduler_release. */
 bool scheduler_submit(struct scheduler *scheduler, const struct pen_request *request,
     const uint8_t key[PEN_ID_BYTES], bool shareable, struct waiter *waiter,
     struct pen_error *error);
@@ -77,8 +88,11 @@ enum take {
 struct taker {
     enum take (*fits)(void *context, struct render *render); /* called with the lock held */
     void *context;
+    uint64_t place; /* of what it took last */
 };
-/* The next render that fits and that somebody still waits for, interactive before batch; NULL: none.
+/* The next render that fits and that somebody still waits for; NULL: none. The client who has had
+ * least of the renderer comes first, and of a client what came first; but renders of the place that
+ * was taken last go before others for a short while, so that what was made for them is used again.
  * The caller gives it back with scheduler_return (to be taken again, first) or scheduler_finish. */
 struct render *scheduler_take(struct scheduler *scheduler, const struct taker *taker);
 /* Of one that was taken: somebody still waits for it. Once not, nobody can join it any more. */
@@ -97,7 +111,9 @@ void scheduler_cancel(struct scheduler *scheduler);
 
 struct scheduler_numbers {
     uint32_t queued, running, waiting; /* renders, renders, clients */
-    uint64_t refused_full, refused_share, expired, abandoned, shared;
+    uint64_t refused_full, refused_share, refused_late, expired, abandoned, shared;
+    double backlog_ms; /* what is queued and running will take, as far as that is known */
+    uint32_t estimates;
     bool full, draining;
 };
 void scheduler_read(struct scheduler *scheduler, struct scheduler_numbers *numbers);

@@ -206,6 +206,7 @@ static enum step_end queue(struct call *call, struct pen_error *error)
         return STEP_NEXT;
     picture_key(&work->request, key);
     work->waiter = (struct waiter){.client = call->client,
+        .request_id = call->exchange->request_id,
         .deadline_ns = call->exchange->body_ns + work->request.delivery.deadline_ms * CLOCK_MS,
         .best = work->request.delivery.on_deadline == PEN_DEADLINE_BEST,
         .is_gone = is_gone,

@@ -1,4 +1,5 @@
 #include "server/store/picture.h"
+#include "protocol/fnv.h"
 #include "server/base/hash.h"
 #include <fcntl.h>
 #include <stdlib.h>
@@ -99,4 +100,19 @@ void picture_key(const struct pen_request *request, uint8_t key[PEN_ID_BYTES])
     struct hash *hash = hash_create();
     hash_add(hash, request, PEN_REQUEST_KEY_BYTES);
     hash_finish(hash, key);
+}
+
+uint64_t picture_place(const struct pen_request *r)
+{
+    uint64_t place = pen_fnv(PEN_FNV_START, r->scene, sizeof r->scene);
+    place = pen_fnv(place, r->animation, sizeof r->animation);
+    place = pen_fnv(place, r->variant, sizeof r->variant);
+    place = pen_fnv(place, &r->time_s, sizeof r->time_s);
+    return pen_fnv(place, r->lights, (r->lights_given ? r->light_count : 0) * sizeof *r->lights);
+}
+
+double picture_share(const struct pen_result *result)
+{
+    const struct pen_progress *p = result ? &result->progress : NULL;
+    return p && p->done && p->done < p->total ? (double)p->done / p->total : 1;
 }

@@ -28,5 +28,9 @@ const char *picture_build(void);
 /* The strong ETag of what a request gives on a device: build, device and key bytes, hashed. */
 void picture_tag(const struct pen_request *request, const struct pen_device_info *device,
     char tag[PEN_ID_HEX + 1]);
+/* How much of its samples a picture has that had to end early; else, and of NULL, 1. */
+double picture_share(const struct pen_result *result);
+/* What of a scene's residency, pose and shadow inputs another render can use again: equal numbers. */
+uint64_t picture_place(const struct pen_request *request);
 /* SHA-256 of the request's key bytes. */
 void picture_key(const struct pen_request *request, uint8_t key[PEN_ID_BYTES]);

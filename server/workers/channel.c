@@ -12,6 +12,7 @@ static const size_t payload[CHANNEL_KINDS] = {
     [CHANNEL_REFUSED] = sizeof(struct pen_error),
     [CHANNEL_WARM] = sizeof(struct channel_warm),
     [CHANNEL_PART] = sizeof(struct pen_result),
+    [CHANNEL_TURN] = sizeof(struct channel_turn),
     [CHANNEL_DONE] = sizeof(struct pen_result),
     [CHANNEL_JOB] = sizeof(struct channel_job),
     [CHANNEL_RESIDENT] = sizeof(struct channel_resident),

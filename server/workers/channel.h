@@ -61,6 +61,9 @@ struct channel_resident {
     uint32_t count, reserved;
     uint8_t scenes[CHANNEL_MAX_RESIDENT][PEN_ID_BYTES];
 };
+struct channel_turn {
+    struct pen_place place; /* of the job */
+};
 struct channel_drop {
     uint8_t scene[PEN_ID_BYTES];
 };
@@ -72,6 +75,7 @@ struct channel_message {
         struct channel_hello hello;
         struct channel_warm warm;
         struct channel_job job_data;
+        struct channel_turn turn;
         struct channel_drop drop;
         struct channel_resident resident;
         struct pen_error refused;

@@ -186,7 +186,10 @@ static void tell_turn(struct worker *worker, uint64_t job)
         return;
     worker->told_job = job;
     worker->told_ns = now;
-    send_or_exit(&(struct channel_message){CHANNEL_VERSION, CHANNEL_TURN, job});
+    static struct channel_message message = {CHANNEL_VERSION, CHANNEL_TURN};
+    message.job = job;
+    message.turn.place = worker_turns_place(worker->turns);
+    send_or_exit(&message);
 }
 
 /* One turn of whoever is next. */

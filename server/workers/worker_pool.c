@@ -22,6 +22,8 @@
 #define MAX_ATTEMPTS 6     /* of one render, when somebody else ends the workers */
 #define QUIT_MS 3000
 #define MAX_BACKOFF_MS 5000
+#define LEAST_PATIENCE_NS (10 * CLOCK_S)
+#define SILENCES 120
 #define START_PATIENCE_NS (120 * CLOCK_S)
 
 static bool is_stopping(const struct worker_pool *pool)
@@ -37,7 +39,9 @@ static void spawn(struct slot *slot)
     slot->spawned_ns = clock_now_ns();
     slot->said_hello = slot->hung = false;
     slot->turn_job = 0;
+    slot->turning = false;
     slot->heard_ns = slot->spawned_ns;
+    slot->silence_ns = 0;
     if (socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, pair)) {
         slot->failures++;
         return;
@@ -99,14 +103,18 @@ static void survive(struct slot *slot, struct flight *flight, bool guilty, bool 
     }
 }
 
-static void log_suspect(const struct render *render)
+static void log_suspect(const struct slot *slot, const struct render *render)
 {
+    const struct pen_place *at = &slot->turn_place;
     const struct pen_request *r = &render->request;
     char scene[PEN_ID_HEX + 1];
     pen_id_to_hex(r->scene, scene);
-    log_event(LOG_ERROR, "it was at work on render %llu: scene %s, %.31s, %u x %u x %u, %u lights",
-        (unsigned long long)render->id, scene, r->technique, r->width, r->height, r->antialias,
-        r->light_count);
+    log_event(LOG_ERROR,
+        "it was at work on render %llu: scene %s, request %s, %.31s, %u x %u x %u, %u lights; "
+        "turn %u began in frame %u, light %u, after \"%s\"",
+        (unsigned long long)render->id, scene, *render->request_id ? render->request_id : "-",
+        r->technique, r->width, r->height, r->antialias, r->light_count, at->turn, at->frame,
+        at->light, at->pass);
 }
 
 /* The process has ended, or its socket has: collects it and settles what it had in hand. */
@@ -133,7 +141,7 @@ static void bury(struct slot *slot)
         log_event(LOG_ERROR, "worker %u %s%s", slot->index, slot->hung ? "hung and " : "",
             process_describe(status, text, sizeof text));
         if (suspect)
-            log_suspect(suspect->render);
+            log_suspect(slot, suspect->render);
         pthread_mutex_lock(&pool->lock);
         pool->numbers.restarts++;
         pool->numbers.hangs += slot->hung;
@@ -165,12 +173,13 @@ static bool dispatch(struct slot *slot, struct flight *flight, struct render *re
     struct channel_fds fds = {0};
     struct outcome outcome = {0};
     flight->render = render;
+    slot->place = render->place;
     flight->phase = PHASE_SENT;
     flight->cancelled = false;
     flight->since_ns = clock_now_ns();
     message.job_data.request = render->request;
     message.job_data.measure = render->measure;
-    message.job_data.client = render->client;
+    message.job_data.client = render->payer;
     message.job_data.best_until_ns = render->best_until_ns;
     if (!pool->config.open_job(pool->config.context, &message.job_data, &fds, &outcome.error)) {
         channel_close_fds(&fds);
@@ -202,8 +211,8 @@ static bool feed(struct slot *slot)
     }
     for (int i = 0; i < IN_FLIGHT; i++) {
         while (!slot->flights[i].render) {
-            struct render *render =
-                scheduler_take(pool->config.scheduler, &(struct taker){worker_slot_fits, slot});
+            struct render *render = scheduler_take(
+                pool->config.scheduler, &(struct taker){worker_slot_fits, slot, slot->place});
             if (!render)
                 return true;
             if (!dispatch(slot, &slot->flights[i], render))
@@ -238,10 +247,22 @@ static bool is_at_work(const struct slot *slot)
     return false;
 }
 
+/* How long a piece of work may take: many times what any took lately. As long as nothing is known, and
+ * at most, what the settings say. */
+static uint64_t patience_ns(const struct slot *slot)
+{
+    uint64_t most = slot->pool->config.hang_timeout_ms * CLOCK_MS;
+    uint64_t expected = slot->silence_ns ? SILENCES * slot->silence_ns : most;
+    expected = expected > LEAST_PATIENCE_NS ? expected : LEAST_PATIENCE_NS;
+    return expected < most ? expected : most;
+}
+
 /* A worker hangs when it has work and gives no sign of life for longer than any piece of it takes. */
 static bool is_hung(const struct slot *slot, uint64_t now)
 {
-    uint64_t patience = slot->pool->config.hang_timeout_ms * CLOCK_MS;
+    /* Of loading and encoding nothing is known. */
+    uint64_t patience =
+        slot->turning ? patience_ns(slot) : slot->pool->config.hang_timeout_ms * CLOCK_MS;
     /* A start and a warm-up take their time, whatever is asked of renders. */
     uint64_t start = patience > START_PATIENCE_NS ? patience : START_PATIENCE_NS;
     if (!slot->said_hello)

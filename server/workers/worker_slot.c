@@ -106,6 +106,7 @@ static void on_done(
     pool->numbers.gpu_bytes = result.gpu_bytes;
     pthread_mutex_unlock(&pool->lock);
     take_programs(slot, &result.programs);
+    result.estimate_ms = flight->render->estimate.ms;
     outcome.result = &result;
     if (outcome.error.code == PEN_OK && flight->render->measure != MEASURE_PICTURE) {
         measured_take(flight->render->measure, fds, &outcome);
@@ -183,7 +184,20 @@ static void on_busy(struct slot *slot, struct flight *flight)
     render->busy_ended = slot->ended;
     flight->render = NULL;
     slot->turn_job = 0;
+    slot->turning = false;
     scheduler_return(slot->pool->config.scheduler, render);
+}
+
+#define FORGET_SILENCE 0.998 /* per sign of life */
+
+static void hear_life(struct slot *slot)
+{
+    uint64_t now = clock_now_ns(), silence = now - slot->heard_ns;
+    bool works = slot->turning;
+    uint64_t forgotten = (uint64_t)(FORGET_SILENCE * (double)slot->silence_ns);
+    if (works)
+        slot->silence_ns = silence > forgotten ? silence : forgotten;
+    slot->heard_ns = now;
 }
 
 /* False when the worker is to be buried. */
@@ -191,7 +205,7 @@ static bool on_message(
     struct slot *slot, const struct channel_message *message, const struct channel_fds *fds)
 {
     struct flight *flight = worker_slot_find(slot, message->job);
-    slot->heard_ns = clock_now_ns();
+    hear_life(slot);
     switch (message->kind) {
     case CHANNEL_HELLO:
         if (!slot->said_hello)
@@ -205,6 +219,9 @@ static bool on_message(
         return true;
     case CHANNEL_TURN:
         slot->turn_job = message->job;
+        slot->turning = true;
+        slot->turn_place = message->turn.place;
+        slot->turn_place.pass[sizeof slot->turn_place.pass - 1] = 0;
         return true;
     case CHANNEL_BUSY:
         if (flight)
@@ -214,6 +231,8 @@ static bool on_message(
     case CHANNEL_RENDERED:
         slot->ended += message->kind == CHANNEL_RENDERED;
         slot->turn_job = message->kind == CHANNEL_STARTED ? message->job : 0;
+        slot->turning = false;
+        memset(&slot->turn_place, 0, sizeof slot->turn_place);
         if (flight) {
             flight->phase = message->kind == CHANNEL_STARTED ? PHASE_RENDERING : PHASE_ENCODING;
             flight->since_ns = clock_now_ns();

@@ -35,9 +35,13 @@ struct slot {
     int socket;
     bool said_hello, is_replacement, hung;
     uint64_t turn_job;                      /* whose turn it is; 0: nobody's */
+    bool turning;                           /* it has begun */
+    struct pen_place turn_place;            /* where that job was when the turn began */
+    uint64_t silence_ns;                    /* the longest between two signs of life lately */
     uint64_t spawned_ns, died_ns, heard_ns; /* heard: the last sign of life */
     uint32_t failures;                      /* in a row, before a hello */
     struct flight flights[IN_FLIGHT];
+    uint64_t place;         /* of what it was given last: struct taker */
     uint64_t ended;         /* renders that have left the turns, one way or the other */
     uint64_t kept_free_for; /* the render that waits for room; 0: none */
     uint64_t kept_free_ns;  /* since when */

@@ -1,30 +1,21 @@
 #include "server/workers/worker_turns.h"
 #include "protocol/memory.h"
 #include "server/base/clock.h"
+#include "server/queue/accounts.h"
 #include <math.h>
 #include <stdlib.h>
 
-#define CLIENTS 64 /* whose time is remembered */
 /* A render that has only begun is not interrupted by its equals: if all are short, each is done
  * sooner when they come one after the other. */
 #define UNDISTURBED_MS 100.0
-/* What a client who was away may use before those who were there all the time get their share. */
-#define CREDIT_MS 1000.0
 #define PART_SHARE 0.06 /* of a render's time, for pictures of it on the way */
-#define BATCH_COST 8.0  /* a batch's time counts so many times */
-
-struct client {
-    uint64_t id; /* 0: unused */
-    double used_ms;
-    uint64_t last_ns;
-};
 
 struct turn {
     struct worker_turns *turns;
     struct pen_render *render; /* NULL: unused */
     struct worker_item *item;
-    uint64_t client, arrived;
-    bool batch;
+    struct account *account;
+    uint64_t arrived;
     double ms;
 };
 
@@ -32,7 +23,7 @@ struct worker_turns {
     struct pen_renderer *renderer;
     struct turn turns[PEN_MAX_RENDERS];
     struct turn *current; /* who had or has the turn; NULL: none */
-    struct client clients[CLIENTS];
+    struct accounts *accounts;
     uint64_t arrivals;
     void (*on_part)(void *context, struct worker_item *part);
     void *context;
@@ -43,6 +34,7 @@ struct worker_turns *worker_turns_create(struct pen_renderer *renderer,
 {
     struct worker_turns *t = pen_alloc_zero(1, sizeof *t);
     t->renderer = renderer;
+    t->accounts = accounts_create();
     t->on_part = on_part;
     t->context = context;
     return t;
@@ -74,6 +66,7 @@ static struct worker_item *finish(struct worker_turns *t, struct turn *turn)
     if (!pen_render_end(turn->render, &result->error) && result->error.code == PEN_OK)
         pen_fail(&result->error, PEN_INTERNAL, "", "The render failed without saying why.");
     result->turns_ms = turn->ms;
+    accounts_leave(t->accounts, turn->account, clock_now_ns());
     if (t->current == turn)
         t->current = NULL;
     *turn = (struct turn){0};
@@ -87,34 +80,8 @@ void worker_turns_destroy(struct worker_turns *t)
     for (uint32_t i = 0; i < PEN_MAX_RENDERS; i++)
         if (t->turns[i].render)
             free(finish(t, &t->turns[i]));
+    accounts_destroy(t->accounts);
     free(t);
-}
-
-/* The client's account; made of the one that was unused for longest when there is none. */
-static struct client *account(struct worker_turns *t, uint64_t id)
-{
-    struct client *oldest = &t->clients[0];
-    for (uint32_t i = 0; i < CLIENTS; i++) {
-        if (t->clients[i].id == id)
-            return &t->clients[i];
-        if (t->clients[i].last_ns < oldest->last_ns)
-            oldest = &t->clients[i];
-    }
-    *oldest = (struct client){.id = id};
-    return oldest;
-}
-
-/* The least that a client with something in progress has used; < 0: nothing is. */
-static double least_used(struct worker_turns *t)
-{
-    double least = -1;
-    for (uint32_t i = 0; i < PEN_MAX_RENDERS; i++) {
-        if (!t->turns[i].render)
-            continue;
-        double used = account(t, t->turns[i].client)->used_ms;
-        least = least < 0 ? used : fmin(least, used);
-    }
-    return least;
 }
 
 bool worker_turns_begin(struct worker_turns *t, const struct pen_request *request, uint64_t client,
@@ -124,7 +91,6 @@ bool worker_turns_begin(struct worker_turns *t, const struct pen_request *reques
     struct turn *turn = NULL;
     for (uint32_t i = 0; i < PEN_MAX_RENDERS && !turn; i++)
         turn = t->turns[i].render ? NULL : &t->turns[i];
-    double least = least_used(t);
     bool batch = request->delivery.priority == PEN_PRIORITY_BATCH;
     struct pen_error error = {0};
     struct pen_render *render =
@@ -144,27 +110,19 @@ bool worker_turns_begin(struct worker_turns *t, const struct pen_request *reques
     *turn = (struct turn){.turns = t,
         .render = render,
         .item = item,
-        .client = client ? client : ~number, /* nobody has such a number */
-        .arrived = number,
-        .batch = batch};
-    struct client *c = account(t, turn->client);
-    c->last_ns = clock_now_ns();
-    if (least >= 0)
-        c->used_ms = fmax(c->used_ms, least - (batch ? 0 : CREDIT_MS));
+        .account = accounts_enter(t->accounts, client ? client : ~number, /* nobody is called so */
+            batch, clock_now_ns()),
+        .arrived = number};
     return true;
 }
 
-static bool comes_before(struct worker_turns *t, const struct turn *a, const struct turn *b)
+static bool comes_before(const struct turn *a, const struct turn *b)
 {
-    if (a->client == b->client) {
-        if (a->batch != b->batch)
-            return b->batch;
-        /* What has had least goes first: short ones are done before long ones, seen from whichever
-         * side they came. */
-        double had[] = {floor(a->ms / UNDISTURBED_MS), floor(b->ms / UNDISTURBED_MS)};
-        return had[0] != had[1] ? had[0] < had[1] : a->arrived < b->arrived;
-    }
-    double used[] = {account(t, a->client)->used_ms, account(t, b->client)->used_ms};
+    double used[] = {a->account->used_ms, b->account->used_ms};
+    /* Of one client, what has had least goes first: short ones are done before long ones, seen from
+     * whichever side they came. */
+    if (a->account == b->account)
+        used[0] = floor(a->ms / UNDISTURBED_MS), used[1] = floor(b->ms / UNDISTURBED_MS);
     return used[0] != used[1] ? used[0] < used[1] : a->arrived < b->arrived;
 }
 
@@ -176,15 +134,20 @@ uint64_t worker_turns_next(struct worker_turns *t)
         struct turn *turn = &t->turns[i];
         if (!turn->render)
             continue;
-        interactive |= !turn->batch;
-        if (!best || comes_before(t, turn, best))
+        interactive |= !turn->account->batch;
+        if (!best || comes_before(turn, best))
             best = turn;
     }
-    bool stays =
-        t->current && t->current->ms < UNDISTURBED_MS && (!t->current->batch || !interactive);
+    bool stays = t->current && t->current->ms < UNDISTURBED_MS &&
+                 (!t->current->account->batch || !interactive);
     if (!stays)
         t->current = best;
     return t->current ? t->current->item->message.job : 0;
+}
+
+struct pen_place worker_turns_place(const struct worker_turns *t)
+{
+    return pen_render_place(t->current->render);
 }
 
 struct worker_item *worker_turns_run(struct worker_turns *t)
@@ -193,10 +156,8 @@ struct worker_item *worker_turns_run(struct worker_turns *t)
     uint64_t start = clock_now_ns();
     bool ended = pen_render_advance(turn->render, WORKER_TURN_MS);
     double ms = clock_ms(clock_now_ns() - start);
-    struct client *c = account(t, turn->client);
     turn->ms += ms;
-    c->used_ms += turn->batch ? BATCH_COST * ms : ms;
-    c->last_ns = clock_now_ns();
+    accounts_charge(t->accounts, turn->account, ms);
     if (ended)
         return finish(t, turn);
     bool late = turn->item->best_until_ns && clock_now_ns() > turn->item->best_until_ns;

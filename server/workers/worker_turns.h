@@ -21,6 +21,8 @@ bool worker_turns_begin(struct worker_turns *turns, const struct pen_request *re
 void worker_turns_want(struct worker_turns *turns, uint64_t job);
 /* The job whose turn is next; 0: none is in progress. */
 uint64_t worker_turns_next(struct worker_turns *turns);
+/* Where that job is. */
+struct pen_place worker_turns_place(const struct worker_turns *turns);
 /* One turn of that job. Its item once it has ended, well or not; else NULL. */
 struct worker_item *worker_turns_run(struct worker_turns *turns);
 /* Gives a job up. Its item, with an error; NULL when it is not in progress. */

@@ -43,7 +43,7 @@ static bool submit(struct scheduler *s, struct client *client, uint8_t key, bool
         .is_gone = is_gone,
         .finish = finish};
     bool ok = scheduler_submit(s, &request, id, shareable, &client->waiter, error);
-    CHECK(ok || !error || (error->retry_after_s >= 1 && error->retry_after_s <= 60));
+    CHECK(ok || !error || (error->retry_after_s >= 1 && error->retry_after_s <= 600));
     return ok;
 }
 
@@ -82,23 +82,19 @@ static void test_order(void)
         CHECK(submit(s, &c[i], 100 + i, true, true, 1, 1000, NULL));
     for (uint8_t i = 4; i < 24; i++)
         CHECK(submit(s, &c[i], i, false, true, 1, 1000, NULL));
-    uint32_t batch_turns = 0, last = 0, first_batch = 0;
+    uint32_t batch_turns = 0, last = 0;
     for (int i = 0; i < 24; i++) {
         uint32_t key = take_and_finish(s, 0);
         if (key >= 100) {
             batch_turns++;
-            first_batch = first_batch ? first_batch : (uint32_t)i + 1;
             CHECK(key == 99 + batch_turns); /* in order among themselves */
+            CHECK(i >= 20);                 /* after what takes no time; see server_fairness.c */
         } else {
             CHECK(key > last);
             last = key;
         }
-        /* Batches neither go first nor starve. */
-        if (i == 15)
-            CHECK(batch_turns >= 1 && batch_turns <= 2);
     }
     CHECK(batch_turns == 4);
-    CHECK(first_batch > 4);
     for (int i = 0; i < 24; i++)
         CHECK(c[i].answers == 1 && c[i].code == 0);
     scheduler_destroy(s);
@@ -248,8 +244,9 @@ static void test_what_does_not_fit(void)
     CHECK(take_width(s, &choosy) == 0);
     choosy.answers[1] = TAKE_FITS;
     choosy.answers[3] = TAKE_NOTHING;
-    CHECK(take_width(s, &choosy) == 1);
+    CHECK(take_width(s, &choosy) == 0);
     choosy.answers[3] = TAKE_LATER;
+    CHECK(take_width(s, &choosy) == 1);
     CHECK(take_width(s, &choosy) == 4);
     CHECK(take_width(s, &choosy) == 0);
     choosy.answers[3] = TAKE_FITS;

@@ -422,9 +422,77 @@ static void test_refusals(struct pen_trace_scene *scene, struct picture *p)
     psc_builder_destroy(builder);
 }
 
+/* Between two pieces of a job, other jobs with lights of their own trace the same scene; where only
+ * fronts cast each of them has a hierarchy. */
+struct guests {
+    struct pen_trace_scene *scene;
+    struct picture *picture;
+    uint32_t calls, jobs, gives_up;
+};
+
+static struct pen_trace_light light_at(uint32_t place)
+{
+    struct pen_trace_light light = downward_light(PEN_TRACE_RECT, 0.5f);
+    light.origin[0] = 0.1f * (float)place;
+    return light;
+}
+
+static bool guest_turn(void *context)
+{
+    struct guests *g = context;
+    g->calls++;
+    if (g->jobs < 2 * TRACE_HIERARCHIES) {
+        struct pen_trace_job job = job_for(g->picture, 4);
+        struct pen_trace_light light = light_at(g->jobs++ % (TRACE_HIERARCHIES + 2));
+        job.front_only = true;
+        run(g->scene, &light, &job, g->picture);
+    }
+    return !g->gives_up || g->calls < g->gives_up;
+}
+
+static void test_turns(void)
+{
+    struct pen_trace_scene *scene = ball_scene();
+    struct picture *alone = take_picture(scene), *beside = take_picture(scene);
+    struct guests guests = {NULL, take_picture(scene), 0, 0, 0};
+    struct pen_trace_light light = light_at(0);
+    struct pen_trace_job job = job_for(alone, 64);
+    job.front_only = true;
+    run(scene, &light, &job, alone);
+    pen_trace_scene_destroy(scene);
+    job.turn = guest_turn;
+    job.turn_context = &guests;
+    job.turn_ms = 0.1;
+    guests.scene = scene = ball_scene();
+    run(scene, &light, &job, beside);
+    CHECK(guests.jobs == 2 * TRACE_HIERARCHIES);
+    CHECK(!memcmp(alone->visibility, beside->visibility, sizeof alone->visibility));
+    pen_trace_scene_destroy(scene);
+    /* Given up while the hierarchy is built, and later: nothing is left half made. */
+    guests.scene = scene = ball_scene();
+    for (guests.gives_up = 1; guests.gives_up < 20; guests.gives_up++) {
+        struct pen_trace_result result = {beside->visibility[0], beside->error, beside->samples};
+        struct pen_trace_stats stats;
+        struct pen_error error = {0};
+        guests.calls = guests.jobs = 0;
+        light = light_at(guests.gives_up);
+        CHECK(!pen_trace_visibility(scene, &light, &job, &result, &stats, &error));
+    }
+    guests.gives_up = 0;
+    light = light_at(0);
+    memset(beside->visibility, 0, sizeof beside->visibility);
+    run(scene, &light, &job, beside);
+    CHECK(!memcmp(alone->visibility, beside->visibility, sizeof alone->visibility));
+    pen_trace_scene_destroy(scene);
+    free(alone);
+    free(beside);
+    free(guests.picture);
+}
+
 int main(void)
 {
     test_nets();
+    test_turns();
     test_error_estimate();
     struct pen_trace_scene *scene = ball_scene();
     struct picture *picture = take_picture(scene);

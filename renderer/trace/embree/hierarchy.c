@@ -2,8 +2,10 @@
  * cast. */
 #include "renderer/trace/embree/internal.h"
 #include <math.h>
+#include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 /* On which side of a triangle's plane the light lies: 1 all in front, 0 across, -1 all behind. */
 static int side_of(const struct trace_silhouette *light, const float corner[3][3])
@@ -121,7 +123,8 @@ static bool cull(struct pen_trace_scene *scene, struct trace_hierarchy *h,
 }
 
 /* Embree's medium quality: the high one builds three times as long and traces no faster here. */
-static bool build(struct pen_trace_scene *scene, struct trace_hierarchy *h, struct pen_error *error)
+static bool build(struct pen_trace_scene *scene, struct trace_hierarchy *h,
+    RTCProgressMonitorFunction goes_on, void *context, struct pen_error *error)
 {
     uint32_t counts[TRACE_GEOMETRIES] = {
         [TRACE_GEOMETRY_TWO_SIDED] = scene->triangle_count[TRACE_TWO_SIDED],
@@ -151,32 +154,147 @@ static bool build(struct pen_trace_scene *scene, struct trace_hierarchy *h, stru
         !add_geometry(scene, h, TRACE_GEOMETRY_GROUND, (const float(*)[3])scene->ground, 4,
             (const uint32_t(*)[3])scene->ground_indices, 2, error))
         return false;
+    if (goes_on)
+        rtcSetSceneProgressMonitorFunction(h->scene, goes_on, context);
     rtcCommitScene(h->scene);
-    scene->builds++;
+    if (goes_on) /* what was handed over ends with the build */
+        rtcSetSceneProgressMonitorFunction(h->scene, NULL, NULL);
     return trace_check_device(scene, error);
 }
 
-const struct trace_hierarchy *trace_hierarchy_get(
-    struct pen_trace_scene *scene, const struct trace_silhouette *light, struct pen_error *error)
+#define BUILT_AT_ONCE 5000 /* triangles; some milliseconds */
+#define LOOK_EVERY_US 500
+
+/* One that is built while others have their turns. */
+struct trace_building {
+    struct pen_trace_scene *scene;
+    struct trace_hierarchy *hierarchy;
+    pthread_t thread;
+    atomic_bool abandoned, ended;
+    bool ok;
+};
+
+static bool goes_on(void *context, double share)
 {
-    struct trace_hierarchy *oldest = &scene->hierarchies[0];
+    struct trace_building *b = context;
+    (void)share;
+    return !atomic_load(&b->abandoned);
+}
+
+static void *build_beside(void *context)
+{
+    struct trace_building *b = context;
+    b->ok = build(b->scene, b->hierarchy, goes_on, b, &b->hierarchy->error);
+    atomic_store(&b->ended, true);
+    return NULL;
+}
+
+static void made(struct pen_trace_scene *scene, struct trace_hierarchy *h, bool ok)
+{
+    scene->builds++;
+    h->last_use = ok ? ++scene->clock : 0;
+}
+
+/* Begins to make it, or makes it. */
+static void begin(
+    struct pen_trace_scene *scene, struct trace_hierarchy *h, const struct pen_trace_job *job)
+{
+    uint64_t triangles = 0;
+    for (uint32_t g = 0; g < TRACE_GROUPS; g++)
+        triangles += scene->triangle_count[g];
+    bool beside = job && job->turn && triangles >= BUILT_AT_ONCE;
+    struct trace_building *b = beside ? calloc(1, sizeof *b) : NULL;
+    if (b) {
+        *b = (struct trace_building){.scene = scene, .hierarchy = h};
+        h->building = b;
+        if (!pthread_create(&b->thread, NULL, build_beside, b))
+            return;
+        h->building = NULL;
+        free(b);
+    }
+    made(scene, h, build(scene, h, NULL, NULL, &h->error));
+}
+
+/* Whoever sees first that it has ended. */
+static void end(struct pen_trace_scene *scene, struct trace_hierarchy *h)
+{
+    struct trace_building *b = h->building;
+    pthread_join(b->thread, NULL);
+    made(scene, h, b->ok);
+    h->building = NULL;
+    free(b);
+}
+
+/* False when the job has given up; it says why. */
+static bool await(
+    struct pen_trace_scene *scene, struct trace_hierarchy *h, const struct pen_trace_job *job)
+{
+    while (h->building) {
+        if (atomic_load(&h->building->ended)) {
+            end(scene, h);
+            break;
+        }
+        usleep(LOOK_EVERY_US);
+        if (job && job->turn && !job->turn(job->turn_context))
+            return false;
+    }
+    return true;
+}
+
+/* The one for that light, or a place for it; NULL: all are in use. */
+static struct trace_hierarchy *find(
+    struct pen_trace_scene *scene, const struct trace_silhouette *light)
+{
+    struct trace_hierarchy *oldest = NULL;
     for (uint32_t i = 0; i < TRACE_HIERARCHIES; i++) {
         struct trace_hierarchy *h = &scene->hierarchies[i];
-        if (h->last_use && !memcmp(&h->light, light, sizeof *light)) {
-            h->last_use = ++scene->clock;
+        if ((h->last_use || h->users) && !memcmp(&h->light, light, sizeof *light))
             return h;
-        }
-        if (h->last_use < oldest->last_use)
+        if (!h->users && (!oldest || h->last_use < oldest->last_use))
             oldest = h;
     }
-    trace_hierarchy_finish(scene, oldest);
-    oldest->light = *light;
-    if (!build(scene, oldest, error)) {
+    if (oldest)
         trace_hierarchy_finish(scene, oldest);
+    return oldest;
+}
+
+const struct trace_hierarchy *trace_hierarchy_get(struct pen_trace_scene *scene,
+    const struct trace_silhouette *light, const struct pen_trace_job *job, struct pen_error *error)
+{
+    struct trace_hierarchy *h = find(scene, light);
+    if (!h) {
+        pen_fail(error, PEN_INTERNAL, "", "Too many hierarchies are in use.");
         return NULL;
     }
-    oldest->last_use = ++scene->clock;
-    return oldest;
+    if (!h->last_use && !h->users) {
+        h->light = *light;
+        begin(scene, h, job);
+    }
+    h->users++;
+    bool stays = await(scene, h, job);
+    if (stays && h->last_use) {
+        h->last_use = ++scene->clock;
+        return h;
+    }
+    if (stays && error && error->code == PEN_OK)
+        *error = h->error;
+    trace_hierarchy_release(scene, h);
+    return NULL;
+}
+
+/* What nobody wants any more is not built to the end; what could not be made is tried again. */
+void trace_hierarchy_release(struct pen_trace_scene *scene, const struct trace_hierarchy *hierarchy)
+{
+    struct trace_hierarchy *h = &scene->hierarchies[hierarchy - scene->hierarchies];
+    if (--h->users)
+        return;
+    if (h->building) {
+        atomic_store(&h->building->abandoned, true);
+        end(scene, h);
+        h->last_use = 0;
+    }
+    if (!h->last_use)
+        trace_hierarchy_finish(scene, h);
 }
 
 void trace_hierarchy_finish(struct pen_trace_scene *scene, struct trace_hierarchy *h)

@@ -70,9 +70,12 @@ struct trace_hierarchy {
         const uint32_t *triangles; /* alpha_triangles, or NULL: the same */
         bool both_sides;           /* facing does not count */
     } filter;
-    struct trace_silhouette light; /* what it was made for */
-    uint64_t last_use;             /* 0: unused slot */
-    uint64_t bytes;                /* of the subsets */
+    struct trace_silhouette light;   /* what it was made for */
+    uint64_t last_use;               /* 0: unused slot */
+    uint32_t users;                  /* jobs that trace it; several may take turns */
+    struct trace_building *building; /* by a thread of its own, while they wait; NULL: it is not */
+    struct pen_error error;          /* why it could not be made */
+    uint64_t bytes;                  /* of the subsets */
     uint64_t filtered, triangles;
 };
 
@@ -112,9 +115,12 @@ void trace_filter_facing_primary(const struct RTCFilterFunctionNArguments *args)
 void trace_filter_alpha_shadow(const struct RTCFilterFunctionNArguments *args);
 void trace_filter_alpha_primary(const struct RTCFilterFunctionNArguments *args);
 
-/* The hierarchy for a light or, TRACE_EYE, for primary rays; made when there is none yet. */
-const struct trace_hierarchy *trace_hierarchy_get(
-    struct pen_trace_scene *scene, const struct trace_silhouette *light, struct pen_error *error);
+/* The hierarchy for a light or, TRACE_EYE, for primary rays; made when there is none yet, while which
+ * `job` (or NULL) gives way to others, and may give up. It stays until it is released. */
+const struct trace_hierarchy *trace_hierarchy_get(struct pen_trace_scene *scene,
+    const struct trace_silhouette *light, const struct pen_trace_job *job, struct pen_error *error);
+void trace_hierarchy_release(
+    struct pen_trace_scene *scene, const struct trace_hierarchy *hierarchy);
 void trace_hierarchy_finish(struct pen_trace_scene *scene, struct trace_hierarchy *hierarchy);
 /* False, with *error filled, when Embree complains or the budget is spent. */
 bool trace_check_device(struct pen_trace_scene *scene, struct pen_error *error);

@@ -132,7 +132,7 @@ bool pen_trace_primary(struct pen_trace_scene *scene, const struct pen_trace_cam
         camera->height > 1u << 16 || !(camera->tan_half_fov_y > 0))
         return pen_fail(error, PEN_INVALID, "", "The camera has no pixels.");
     const struct trace_hierarchy *hierarchy =
-        trace_hierarchy_get(scene, &(struct trace_silhouette){.shape = TRACE_EYE}, error);
+        trace_hierarchy_get(scene, &(struct trace_silhouette){.shape = TRACE_EYE}, NULL, error);
     if (!hierarchy)
         return false;
     uint32_t blocks_x = (camera->width + BLOCK - 1) / BLOCK;
@@ -144,5 +144,6 @@ bool pen_trace_primary(struct pen_trace_scene *scene, const struct pen_trace_cam
         .rtc = hierarchy->scene};
     double cpu_seconds = 0;
     trace_parallel(trace_thread_count(threads), blocks_x * blocks_y, trace_block, &p, &cpu_seconds);
+    trace_hierarchy_release(scene, hierarchy);
     return true;
 }

@@ -541,7 +541,7 @@ bool pen_trace_visibility(struct pen_trace_scene *scene, const struct pen_trace_
     if (job->front_only)
         silhouette = trace_silhouette_of(&run.emitter);
     uint64_t builds = scene->builds;
-    const struct trace_hierarchy *hierarchy = trace_hierarchy_get(scene, &silhouette, error);
+    const struct trace_hierarchy *hierarchy = trace_hierarchy_get(scene, &silhouette, job, error);
     if (!hierarchy)
         return false;
     double build_seconds = scene->builds != builds ? trace_seconds() - start : 0;
@@ -580,6 +580,7 @@ bool pen_trace_visibility(struct pen_trace_scene *scene, const struct pen_trace_
     }
     ok = true;
 fail:
+    trace_hierarchy_release(scene, hierarchy);
     trace_points_finish(&run.points);
     free(run.verdicts);
     free(run.full);

@@ -7,6 +7,7 @@
 #include <errno.h>
 #include <microhttpd.h>
 #include <netdb.h>
+#include <netinet/tcp.h>
 #include <poll.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -20,6 +21,8 @@
 #define SWALLOW_BYTES (64u << 10) /* a refused body this small is read, to keep the connection */
 #define CONNECTION_MEMORY (64u << 10)
 #define LINGER_SPARE 64
+#define STREAM_BLOCK (32u << 10)
+#define STREAM_UNSENT (16 << 10) /* of a stream, what the kernel holds that is not on its way yet */
 
 struct http_listener {
     struct http_config config;
@@ -167,6 +170,30 @@ void http_answer(
         MHD_resume_connection(x->connection); /* from here on the exchange may be gone */
 }
 
+void http_answer_stream(
+    struct http_exchange *x, uint32_t status, const char *content_type, struct http_stream stream)
+{
+    x->stream = stream;
+    http_answer(x, status, content_type,
+        (struct http_body){.release = stream.release, .owner = stream.owner});
+}
+
+void http_sleep(struct http_exchange *x)
+{
+    door_set(x->listener->door, x->fd, DOOR_BUSY, 0);
+    MHD_suspend_connection(x->connection);
+}
+
+void http_wake(struct http_exchange *x)
+{
+    MHD_resume_connection(x->connection);
+}
+
+void http_expect(struct http_exchange *x, uint64_t bytes)
+{
+    door_set(x->listener->door, x->fd, DOOR_SENDING, bytes);
+}
+
 void http_defer(struct http_exchange *x)
 {
     x->deferred = true;
@@ -199,12 +226,38 @@ static bool is_draining(const struct http_listener *listener)
     return __atomic_load_n(&listener->draining, __ATOMIC_ACQUIRE);
 }
 
+static ssize_t read_stream(void *context, uint64_t position, char *to, size_t most)
+{
+    struct http_exchange *x = context;
+    (void)position;
+    int64_t n = x->stream.read(x->stream.owner, to, most);
+    if (n >= 0)
+        x->body.size += (size_t)n;
+    return n >= 0                  ? (ssize_t)n
+           : n == HTTP_STREAM_OVER ? MHD_CONTENT_READER_END_OF_STREAM
+                                   : MHD_CONTENT_READER_END_WITH_ERROR;
+}
+
+/* What a slow client has not read must not pile up in the kernel; 0: as much as usual. */
+static void limit_unsent(struct http_exchange *x, int bytes)
+{
+    setsockopt(x->fd, IPPROTO_TCP, TCP_NOTSENT_LOWAT, &bytes, sizeof bytes);
+}
+
+static struct MHD_Response *make_response(struct http_exchange *x)
+{
+    if (!x->stream.read) /* released in completed() */
+        return MHD_create_response_from_buffer(
+            x->body.size, (void *)x->body.data, MHD_RESPMEM_PERSISTENT);
+    limit_unsent(x, STREAM_UNSENT);
+    return MHD_create_response_from_callback(MHD_SIZE_UNKNOWN, STREAM_BLOCK, read_stream, x, NULL);
+}
+
 /* Hands the answer to libmicrohttpd. */
 static enum MHD_Result queue(struct http_exchange *x)
 {
     struct http_listener *listener = x->listener;
-    struct MHD_Response *response = MHD_create_response_from_buffer(
-        x->body.size, (void *)x->body.data, MHD_RESPMEM_PERSISTENT); /* released in completed() */
+    struct MHD_Response *response = make_response(x);
     if (!response)
         return MHD_NO;
     bool complete = true;
@@ -342,6 +395,8 @@ static void on_completed(void *context, struct MHD_Connection *connection, void 
         if (x->answered && x->body.release)
             x->body.release(x->body.owner);
     }
+    if (x->stream.read)
+        limit_unsent(x, 0);
     door_set(listener->door, x->fd, DOOR_WAITING, 0);
     if (x->begun)
         __atomic_sub_fetch(&listener->active, 1, __ATOMIC_ACQ_REL);

@@ -18,6 +18,18 @@ struct http_body {
     void *owner;
 };
 
+/* Bytes that come over time. */
+#define HTTP_STREAM_OVER (-1)
+#define HTTP_STREAM_BROKEN (-2) /* the client is to see that the answer is not complete */
+struct http_stream {
+    /* On a thread of the listener: puts at most `most` bytes at `to` and returns how many, or one of
+     * the above. 0: there are none yet, and http_sleep has been called. Asked again when the
+     * socket has taken what it gave; NULL: the answer is no stream. */
+    int64_t (*read)(void *owner, void *to, size_t most);
+    void (*release)(void *owner);
+    void *owner;
+};
+
 struct http_header {
     char name[40], value[600];
 };
@@ -34,7 +46,8 @@ struct http_exchange {
     void *user;                  /* the owner's */
     /* The answer, for the log: */
     uint32_t status;
-    struct http_body body;
+    struct http_body body; /* of a stream, its size is what was sent so far */
+    struct http_stream stream;
     bool aborted; /* the client did not get all of the answer */
     /* http.c's own: */
     struct http_header headers[HTTP_MAX_HEADERS];
@@ -86,6 +99,15 @@ void http_add_header(struct http_exchange *exchange, const char *name, const cha
  * once after http_defer. Takes the body. */
 void http_answer(struct http_exchange *exchange, uint32_t status, const char *content_type,
     struct http_body body);
+/* Answers with a stream, in the same way; nothing is sent of it when only the header is asked for. */
+void http_answer_stream(struct http_exchange *exchange, uint32_t status, const char *content_type,
+    struct http_stream stream);
+/* Inside `read`, which then returns 0, and before another thread can wake it: the stream has nothing
+ * more until http_wake, from any thread, once. */
+void http_sleep(struct http_exchange *exchange);
+void http_wake(struct http_exchange *exchange);
+/* Inside `read`: from here on `bytes` follow without a pause, for which the client has its time. */
+void http_expect(struct http_exchange *exchange, uint64_t bytes);
 /* The answer comes later, from http_answer. Only inside `end`, and before the work is handed to
  * another thread; the exchange must not be touched afterwards by the caller. */
 void http_defer(struct http_exchange *exchange);

@@ -1,10 +1,8 @@
-#include "server/queue/scheduler.h"
+#include "server/queue/scheduler_state.h"
 #include "protocol/memory.h"
 #include "server/base/clock.h"
-#include "server/queue/shares.h"
 #include <fcntl.h>
 #include <math.h>
-#include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -18,22 +16,6 @@
  * and nobody is passed more often. */
 #define SAME_PLACE_MS 250.0
 #define SAME_PLACE_PASSES 8
-
-struct scheduler {
-    pthread_mutex_t lock;    /* guards everything below, and the waiters of every render */
-    struct render *queue[2]; /* first, last */
-    struct render *running;
-    struct shares *shares;
-    uint64_t next_id;
-    struct accounts *accounts;
-    struct estimates *estimates;
-    double mean_ms; /* of a render on a worker, decaying */
-    struct scheduler_numbers numbers;
-    /* Constant after creation. */
-    struct scheduler_limits limits;
-    void (*on_work)(void *);
-    void *context;
-};
 
 struct scheduler *scheduler_create(
     const struct scheduler_limits *limits, void (*on_work)(void *context), void *context)
@@ -399,12 +381,7 @@ static bool keep_wanted(struct scheduler *s, struct render *render)
     pthread_mutex_lock(&s->lock);
     s->numbers.abandoned += gone;
     s->numbers.waiting -= gone;
-    while (waiters) {
-        struct waiter *waiter = waiters;
-        waiters = waiter->next;
-        waiter->next = render->waiters;
-        render->waiters = waiter;
-    }
+    scheduler_put_back(render, waiters);
     return render->waiters != NULL;
 }
 

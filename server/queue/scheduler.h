@@ -29,7 +29,11 @@ struct waiter {
     const char *request_id;                 /* for the log; NULL: none; copied */
     bool (*is_gone)(struct waiter *waiter); /* the client has hung up; may be NULL */
     void (*finish)(struct waiter *waiter, const struct outcome *outcome);
-    bool best;        /* at the deadline a worker that has begun with it gives what there is */
+    bool best; /* at the deadline a worker that has begun with it gives what there is */
+    /* A picture so far, borrowed for the call, when one is wanted; before `finish`, from any thread,
+     * with no lock held. NULL: only the end matters. */
+    void (*part)(struct waiter *waiter, struct picture *picture);
+    bool wants_part;  /* the scheduler's, after scheduler_submit; false again with each `part` */
     uint32_t measure; /* enum measure; what is measured is never shared */
     int reference_fd; /* planes to compare with, needed until scheduler_submit returns; 0: none */
 };
@@ -98,6 +102,14 @@ struct render *scheduler_take(struct scheduler *scheduler, const struct taker *t
 /* Of one that was taken: somebody still waits for it. Once not, nobody can join it any more. */
 bool scheduler_is_wanted(struct scheduler *scheduler, struct render *render);
 void scheduler_return(struct scheduler *scheduler, struct render *render);
+/* The waiter wants the next picture so far. It may have been finished meanwhile, but is still there.
+ */
+void scheduler_want_part(struct scheduler *scheduler, struct waiter *waiter);
+/* Of one that was taken: somebody wants a picture so far. */
+bool scheduler_wants_part(struct scheduler *scheduler, const struct render *render);
+/* Shows a picture so far to those who want one. */
+void scheduler_show_part(
+    struct scheduler *scheduler, struct render *render, struct picture *picture);
 /* Answers everybody who waits and frees the render. */
 void scheduler_finish(
     struct scheduler *scheduler, struct render *render, const struct outcome *outcome);

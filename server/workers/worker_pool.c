@@ -175,7 +175,7 @@ static bool dispatch(struct slot *slot, struct flight *flight, struct render *re
     flight->render = render;
     slot->place = render->place;
     flight->phase = PHASE_SENT;
-    flight->cancelled = false;
+    flight->cancelled = flight->part_wanted = false;
     flight->since_ns = clock_now_ns();
     message.job_data.request = render->request;
     message.job_data.measure = render->measure;
@@ -233,6 +233,22 @@ static bool cancel_unwanted(struct slot *slot)
         flight->cancelled = true;
         count(slot->pool, &slot->pool->numbers.cancelled);
         struct channel_message message = {CHANNEL_VERSION, CHANNEL_CANCEL, flight->render->id};
+        if (!channel_send(slot->socket, &message, NULL))
+            return false;
+    }
+    return true;
+}
+
+/* Asks for pictures so far where somebody wants one; false when the worker is to be buried. */
+static bool ask_for_parts(struct slot *slot)
+{
+    for (int i = 0; i < IN_FLIGHT; i++) {
+        struct flight *flight = &slot->flights[i];
+        if (!flight->render || flight->part_wanted || flight->phase == PHASE_ENCODING ||
+            !scheduler_wants_part(slot->pool->config.scheduler, flight->render))
+            continue;
+        flight->part_wanted = true;
+        struct channel_message message = {CHANNEL_VERSION, CHANNEL_WANT, flight->render->id};
         if (!channel_send(slot->socket, &message, NULL))
             return false;
     }
@@ -322,7 +338,7 @@ static void *run(void *argument)
         /* What a dead worker said last still counts: the socket is emptied before the funeral. */
         bool ok = worker_slot_hear(slot);
         if (slot->hung || !ok || (watch[2].revents && !worker_slot_hear(slot)) ||
-            (slot->said_hello && (!cancel_unwanted(slot) || !feed(slot))))
+            (slot->said_hello && (!cancel_unwanted(slot) || !feed(slot) || !ask_for_parts(slot))))
             bury(slot);
     }
     if (slot->process.pid) {

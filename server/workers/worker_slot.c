@@ -200,6 +200,25 @@ static void hear_life(struct slot *slot)
     slot->heard_ns = now;
 }
 
+/* A picture so far. */
+static void on_part(
+    struct slot *slot, const struct channel_message *message, const struct channel_fds *fds)
+{
+    struct flight *flight = worker_slot_find(slot, message->job);
+    struct pen_result result = message->result;
+    struct pen_error error = {0};
+    if (!flight)
+        return;
+    flight->part_wanted = false;
+    result.stage_ms[PEN_STAGE_QUEUE] =
+        (float)clock_ms(flight->render->taken_ns - flight->render->queued_ns);
+    struct picture *picture =
+        fds->count == 1 ? picture_create(fds->fd[0], &result, NULL, &error) : NULL;
+    if (picture)
+        scheduler_show_part(slot->pool->config.scheduler, flight->render, picture);
+    picture_release(picture);
+}
+
 /* False when the worker is to be buried. */
 static bool on_message(
     struct slot *slot, const struct channel_message *message, const struct channel_fds *fds)
@@ -245,7 +264,8 @@ static bool on_message(
             slot->resident.count = 0;
         pthread_mutex_unlock(&slot->pool->lock);
         return true;
-    case CHANNEL_PART: /* nobody asked for it */
+    case CHANNEL_PART:
+        on_part(slot, message, fds);
         return true;
     case CHANNEL_DONE:
         on_done(slot, message, fds);

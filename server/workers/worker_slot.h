@@ -17,6 +17,7 @@ struct flight {
     enum phase phase;
     uint64_t since_ns; /* of the phase */
     bool cancelled;    /* the worker was told */
+    bool part_wanted;  /* the worker was told, and has not answered yet */
 };
 
 struct worker_pool;

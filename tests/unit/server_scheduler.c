@@ -9,6 +9,7 @@ struct client {
     struct waiter waiter; /* first: a waiter is a client */
     uint32_t answers, code;
     bool shared, gone;
+    uint32_t parts;
 };
 
 static void finish(struct waiter *waiter, const struct outcome *outcome)
@@ -22,6 +23,13 @@ static void finish(struct waiter *waiter, const struct outcome *outcome)
 static bool is_gone(struct waiter *waiter)
 {
     return ((struct client *)waiter)->gone;
+}
+
+static void part(struct waiter *waiter, struct picture *picture)
+{
+    struct client *client = (struct client *)waiter;
+    CHECK(picture && client->answers == 0);
+    client->parts++;
 }
 
 static uint32_t wakes;
@@ -328,8 +336,45 @@ static void test_threads(void)
     scheduler_destroy(s);
 }
 
+/* Who wants a picture so far gets the next one, once; others do not. */
+static void test_parts(void)
+{
+    struct scheduler *s = make(100, 0);
+    struct client c[3];
+    struct picture picture = {0};
+    for (int i = 0; i < 3; i++) {
+        CHECK(submit(s, &c[i], 7, false, true, 1, 1000, NULL));
+        c[i].waiter.part = part;
+    }
+    uint32_t before = wakes;
+    struct render *render = scheduler_take(s, &any);
+    CHECK(render && !scheduler_wants_part(s, render));
+    scheduler_show_part(s, render, &picture);
+    CHECK(c[0].parts == 0 && wakes == before);
+    scheduler_want_part(s, &c[0].waiter);
+    scheduler_want_part(s, &c[2].waiter);
+    scheduler_want_part(s, &c[2].waiter);
+    CHECK(wakes == before + 3 && scheduler_wants_part(s, render));
+    scheduler_show_part(s, render, &picture);
+    scheduler_show_part(s, render, &picture);
+    CHECK(c[0].parts == 1 && c[1].parts == 0 && c[2].parts == 1);
+    CHECK(!scheduler_wants_part(s, render));
+    scheduler_want_part(s, &c[1].waiter);
+    scheduler_return(s, render); /* a worker died: still wanted from the next one */
+    render = scheduler_take(s, &any);
+    CHECK(render && scheduler_wants_part(s, render));
+    c[1].gone = true;
+    CHECK(scheduler_is_wanted(s, render) && !scheduler_wants_part(s, render));
+    scheduler_finish(s, render, &(struct outcome){0});
+    for (int i = 0; i < 3; i++)
+        CHECK(c[i].answers == 1);
+    scheduler_want_part(s, &c[0].waiter); /* too late, which does no harm */
+    scheduler_destroy(s);
+}
+
 int main(void)
 {
+    test_parts();
     test_order();
     test_limits();
     test_sharing();

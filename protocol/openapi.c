@@ -23,6 +23,31 @@ static void write_media(struct pen_json *json, const char *type, const char *sch
     pen_json_end(json);
 }
 
+/* The same picture as it gets better. */
+static void write_parts(struct pen_json *json)
+{
+    static const char *const forms[][2] = {
+        {"multipart/x-mixed-replace",
+            "Pictures that get better, each shown in place of the one before; the last is the "
+            "plain "
+            "answer, byte for byte. A part has no header but its type. An error after the first "
+            "picture is a part of type application/problem+json, and the answer is broken off "
+            "without the closing boundary."},
+        {"text/event-stream",
+            "The same as events: `picture` and at the end `done`, whose data is the record, with a "
+            "link to the picture that holds for a short while; `problem` when it fails, whose data "
+            "is the problem document. Nothing follows `done` and `problem`."},
+    };
+    for (int i = 0; i < 2; i++) {
+        pen_json_object(json, forms[i][0]);
+        pen_json_object(json, "schema");
+        pen_json_string(json, "type", "string");
+        pen_json_string(json, "description", forms[i][1]);
+        pen_json_end(json);
+        pen_json_end(json);
+    }
+}
+
 static void write_content(struct pen_json *json, enum pen_body body)
 {
     static const char *const schemas[] = {
@@ -40,7 +65,12 @@ static void write_content(struct pen_json *json, enum pen_body body)
     case PEN_BODY_PICTURE:
         for (uint32_t i = 0; i < PEN_FORMATS; i++)
             write_media(json, pen_format_mime[i], NULL);
+        break;
+    case PEN_BODY_RENDERED:
+        for (uint32_t i = 0; i < PEN_FORMATS; i++)
+            write_media(json, pen_format_mime[i], NULL);
         write_media(json, "application/json", SCHEMA "Record");
+        write_parts(json);
         break;
     case PEN_BODY_PAGE:
         write_media(json, "text/html", NULL);
@@ -74,7 +104,7 @@ static void write_response(
 {
     pen_json_object(json, status);
     pen_json_string(json, "description", description);
-    if (body == PEN_BODY_PICTURE)
+    if (body == PEN_BODY_PICTURE || body == PEN_BODY_RENDERED)
         write_image_headers(json);
     if (body != PEN_BODY_NONE)
         write_content(json, body);

@@ -117,6 +117,9 @@ static const struct pen_param delivery_rows[] = {
             "query, a method's own parameter of this name goes before."),
     DELIVERY(priority, .def = PEN_PRIORITY_INTERACTIVE, .choices = pen_priority_names,
         .help = "Interactive requests are taken first."),
+    DELIVERY(progressive, .def = 0,
+        .help = "The answer is a row of pictures that get better, as multipart/x-mixed-replace; "
+                "the last one is the plain answer. For an <img>; Accept asks for the same."),
 };
 
 struct pen_param_table pen_request_table(void)

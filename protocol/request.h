@@ -77,6 +77,7 @@ struct pen_delivery {
     uint32_t priority;    /* enum pen_priority */
     uint32_t on_deadline; /* enum pen_on_deadline */
     uint32_t budget_ms;   /* 0: none */
+    pen_flag progressive;
 };
 
 struct pen_request {

@@ -21,8 +21,9 @@ enum pen_body {
 #undef DERIVED
     PEN_BODY_SCENE_UPLOAD,
     PEN_BODY_IMAGE_UPLOAD,
-    PEN_BODY_PICTURE, /* a rendered image, or the record when JSON is accepted */
-    PEN_BODY_PAGE,    /* HTML */
+    PEN_BODY_PICTURE,  /* an image */
+    PEN_BODY_RENDERED, /* a rendered image, its record, or either as it gets better */
+    PEN_BODY_PAGE,     /* HTML */
 };
 /* The media types of an upload, ended by NULL; NULL: the body is no upload. */
 const char *const *pen_upload_types(enum pen_body body);

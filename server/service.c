@@ -21,6 +21,8 @@
 
 #define STRAGGLER_MS 200 /* requests on their way when the last answer is out */
 #define CANCEL_MS 10000
+#define PART_CACHE_BYTES                                                                           \
+    (64u << 20) /* links to pictures that get better hold as long as they fit */
 
 /* ---- what the pool asks for ---- */
 
@@ -290,6 +292,7 @@ struct service *service_create(
         .catalogue = catalogue};
     s->metrics = metrics_create(catalogue);
     s->cache = result_cache_create(config->result_cache.bytes);
+    s->part_cache = result_cache_create(PART_CACHE_BYTES);
     s->scheduler = scheduler_create(&limits, on_work, s);
     s->auto_runs = auto_runs_create(&(struct auto_parts){s->scheduler, s->store, catalogue});
     if (!start_importer(s, error) || !start_pool(s, error) || !start_listeners(s, error))
@@ -351,6 +354,7 @@ void service_destroy(struct service *s, const bool *hurry)
     worker_pool_destroy(s->pool);
     scheduler_destroy(s->scheduler);
     result_cache_destroy(s->cache);
+    result_cache_destroy(s->part_cache);
     metrics_destroy(s->metrics);
     scene_store_close(s->store);
     if (s->canary_blob >= 0)

@@ -45,11 +45,23 @@ bool accept_allows(const char *accept, const char *type)
     return !accept || quality(accept, type, NULL) > 0;
 }
 
-bool accept_record(const char *accept)
+const char *const accept_form_mime[ACCEPT_FORMS] = {
+    NULL, "application/json", "multipart/x-mixed-replace", "text/event-stream"};
+
+enum accept_form accept_form(const char *accept)
 {
-    bool exact = false;
+    enum accept_form best = ACCEPT_PICTURE;
     if (!accept)
-        return false;
-    double json = quality(accept, "application/json", &exact);
-    return exact && json > 0 && json >= quality(accept, "image/png", NULL);
+        return best;
+    double best_q = quality(accept, "image/png", NULL);
+    for (enum accept_form form = ACCEPT_RECORD; form < ACCEPT_FORMS; form++) {
+        bool exact = false;
+        double q = quality(accept, accept_form_mime[form], &exact);
+        bool better = best == ACCEPT_PICTURE ? q >= best_q : q > best_q;
+        if (!exact || q <= 0 || !better)
+            continue;
+        best = form;
+        best_q = q;
+    }
+    return best;
 }

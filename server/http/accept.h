@@ -4,6 +4,15 @@
 
 /* True when `type` ("image/png") may be sent; a missing header allows everything. */
 bool accept_allows(const char *accept, const char *type);
-/* True when the record is wanted rather than an image: application/json stands in the header with a
- * higher quality than every image. */
-bool accept_record(const char *accept);
+/* In what form the answer to a render is wanted. */
+enum accept_form {
+    ACCEPT_PICTURE,
+    ACCEPT_RECORD, /* application/json */
+    ACCEPT_PARTS,  /* multipart/x-mixed-replace: the picture as it gets better */
+    ACCEPT_EVENTS, /* text/event-stream: records of the same */
+    ACCEPT_FORMS
+};
+extern const char *const accept_form_mime[ACCEPT_FORMS]; /* NULL for the picture */
+/* Another form than the picture must be named in the header, with at least the quality of the
+ * picture; among several, the one with the highest quality, and then the first above. */
+enum accept_form accept_form(const char *accept);

@@ -20,20 +20,24 @@ bool call_run(struct call *call, const struct step *first, struct pen_error *err
     }
 }
 
+char *call_problem(struct call *call, const struct pen_error *error)
+{
+    call->note.code = (enum pen_code)error->code;
+    snprintf(call->note.error, sizeof call->note.error, "%.*s", (int)sizeof call->note.error - 1,
+        error->message);
+    return http_problem(error, call->exchange->request_id);
+}
+
 static void answer_problem(struct call *call, const struct pen_error *error)
 {
     struct http_exchange *x = call->exchange;
     struct http_status told = http_status_of((enum pen_code)error->code);
-    call->note.code = (enum pen_code)error->code;
-    snprintf(call->note.error, sizeof call->note.error, "%.*s", (int)sizeof call->note.error - 1,
-        error->message);
     if (error->code == PEN_UNAVAILABLE || error->code == PEN_TOO_MANY)
         http_add_header(x, "Retry-After", "%u", error->retry_after_s ? error->retry_after_s : 1);
     if (error->code == PEN_UNAUTHORIZED)
         http_add_header(x, "WWW-Authenticate", "Bearer");
     http_add_header(x, "Cache-Control", "no-store");
-    http_answer(
-        x, told.status, "application/problem+json", http_text(http_problem(error, x->request_id)));
+    http_answer(x, told.status, "application/problem+json", http_text(call_problem(call, error)));
 }
 
 void call_resume(struct call *call, const struct pen_error *failure)

@@ -53,6 +53,8 @@ void *call_work(struct call *call, size_t bytes, void (*end)(struct call *call, 
 /* Answers. */
 /* Answers with a JSON document, which it takes. Returns true. */
 bool call_json(struct call *call, uint32_t status, char *text);
+/* The problem document of an error, which is noted for the log; the caller frees it. */
+char *call_problem(struct call *call, const struct pen_error *error);
 /* Answers 304 when If-None-Match names the tag; true when it has. Adds the ETag either way. */
 bool call_not_modified(struct call *call, const char *tag);
 /* Whether If-None-Match names the tag, rather than any. */

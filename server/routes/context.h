@@ -21,7 +21,7 @@ struct service {
     struct importer *importer;
     struct scheduler *scheduler;
     struct worker_pool *pool;
-    struct result_cache *cache;
+    struct result_cache *cache, *part_cache; /* pictures; those that got better since */
     struct metrics *metrics;
     struct auto_runs *auto_runs;
     struct auth *auth; /* NULL: no token is asked for */

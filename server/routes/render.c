@@ -6,6 +6,7 @@
 #include "protocol/container.h"
 #include "server/http/accept.h"
 #include "server/http/query.h"
+#include "server/routes/parts.h"
 #include "server/routes/routes.h"
 #include <stdio.h>
 #include <stdlib.h>
@@ -17,7 +18,9 @@ struct rendering {
     struct auto_render choice; /* choice.why "": the method was given */
     struct waiter waiter;
     struct picture *picture; /* when there is one */
-    bool wants_record, holds_share, is_deferred;
+    struct parts *parts;     /* when the answer gets better */
+    enum accept_form form;
+    bool holds_share, is_deferred;
 };
 
 /* ---- what is asked ---- */
@@ -45,14 +48,16 @@ static enum step_end read_request(struct call *call, struct pen_error *error)
     return ok ? STEP_NEXT : STEP_FAILED;
 }
 
-/* Lets Accept choose the format when the request left it at its default. */
+/* Lets Accept choose the form, and the format when the request left it at its default. */
 static enum step_end negotiate(struct call *call, struct pen_error *error)
 {
     struct rendering *work = call->work;
     const char *accept = http_header(call->exchange, "Accept");
     struct pen_output *output = &work->request.output;
-    work->wants_record = accept_record(accept);
-    if (work->wants_record || accept_allows(accept, pen_format_mime[output->format]))
+    work->form = accept_form(accept);
+    if (work->form == ACCEPT_PICTURE && work->request.delivery.progressive.on)
+        work->form = ACCEPT_PARTS;
+    if (work->form == ACCEPT_RECORD || accept_allows(accept, pen_format_mime[output->format]))
         return STEP_NEXT;
     bool is_default = output->format == PEN_PNG;
     for (uint32_t f = 0; is_default && f < PEN_FORMATS; f++) {
@@ -64,6 +69,8 @@ static enum step_end negotiate(struct call *call, struct pen_error *error)
             return STEP_NEXT;
         output->format = PEN_PNG;
     }
+    if (work->form != ACCEPT_PICTURE) /* whatever the parts are */
+        return STEP_NEXT;
     pen_fail(error, PEN_NOT_ACCEPTABLE, "/output/format",
         "The image is %s, which Accept does not allow.", pen_format_mime[output->format]);
     return STEP_FAILED;
@@ -163,7 +170,7 @@ static enum step_end recall(struct call *call, struct pen_error *error)
     if (wants_fresh(call) || !read_device(s, &device))
         return STEP_NEXT;
     picture_tag(&work->request, &device, tag);
-    if (!work->wants_record && call_knows(call, tag)) {
+    if (work->form != ACCEPT_RECORD && work->form != ACCEPT_EVENTS && call_knows(call, tag)) {
         http_add_header(call->exchange, "Vary", "Accept");
         call_not_modified(call, tag);
         return STEP_OVER;
@@ -171,6 +178,12 @@ static enum step_end recall(struct call *call, struct pen_error *error)
     work->picture = result_cache_get(s->cache, tag);
     call->note.cached = work->picture != NULL;
     return STEP_NEXT;
+}
+
+static void note_times(struct call *call, const struct pen_result *result)
+{
+    for (int stage = PEN_STAGE_LOAD; stage < PEN_STAGES; stage++)
+        call->note.render_ms += result->stage_ms[stage];
 }
 
 static struct rendering *rendering_of(struct waiter *waiter)
@@ -184,26 +197,40 @@ static bool is_gone(struct waiter *waiter)
 }
 
 /* Any thread. */
+static void ended(struct call *call, const struct outcome *outcome)
+{
+    struct rendering *work = call->work;
+    call->note.queue_ms = outcome->queue_ms;
+    if (outcome->error.code != PEN_OK)
+        return;
+    work->picture = picture_reference(outcome->picture);
+    note_times(call, &work->picture->result);
+    if (*work->choice.why)
+        auto_runs_observe(call->service->auto_runs, &work->choice, outcome->run_ms);
+}
+
+/* Any thread. */
 static void finish(struct waiter *waiter, const struct outcome *outcome)
 {
-    struct rendering *work = rendering_of(waiter);
-    struct call *call = work->call;
-    call->note.queue_ms = outcome->queue_ms;
-    if (outcome->error.code == PEN_OK) {
-        work->picture = picture_reference(outcome->picture);
-        if (*work->choice.why)
-            auto_runs_observe(call->service->auto_runs, &work->choice, outcome->run_ms);
-    }
+    struct call *call = rendering_of(waiter)->call;
+    ended(call, outcome);
     call_resume(call, &outcome->error);
 }
 
-/* Waits for a worker. */
+/* Waits for a worker, or for its first picture when it gets better. */
 static enum step_end queue(struct call *call, struct pen_error *error)
 {
     struct rendering *work = call->work;
     uint8_t key[PEN_ID_BYTES];
-    if (work->picture)
+    if (work->form == ACCEPT_PARTS || work->form == ACCEPT_EVENTS)
+        work->parts = parts_create(&(struct parts_config){
+            .call = call, .form = work->form, .choice = &work->choice, .ended = ended});
+    if (work->picture) {
+        if (work->parts)
+            parts_give(work->parts, work->picture);
+        note_times(call, &work->picture->result);
         return STEP_NEXT;
+    }
     picture_key(&work->request, key);
     work->waiter = (struct waiter){.client = call->client,
         .request_id = call->exchange->request_id,
@@ -216,8 +243,10 @@ static enum step_end queue(struct call *call, struct pen_error *error)
     work->holds_share = true; /* before another thread can complete the call */
     if (!work->is_deferred)
         http_defer(call->exchange);
-    if (scheduler_submit(
-            call->service->scheduler, &work->request, key, shareable, &work->waiter, error))
+    if (work->parts
+            ? parts_submit(work->parts, &work->request, key, shareable, &work->waiter, error)
+            : scheduler_submit(
+                  call->service->scheduler, &work->request, key, shareable, &work->waiter, error))
         return STEP_OVER;
     work->holds_share = false;
     return STEP_FAILED;
@@ -225,13 +254,27 @@ static enum step_end queue(struct call *call, struct pen_error *error)
 
 /* ---- the answer ---- */
 
+/* What was chosen, and what the method cannot do. */
+static void add_warnings(struct call *call, const struct picture *picture)
+{
+    struct http_exchange *x = call->exchange;
+    const struct rendering *work = call->work;
+    const struct pen_result *result = &picture->result;
+    const char *why = work->choice.why;
+    if (*why)
+        http_add_header(x, "X-Penumbra-Choice", "%s", why);
+    if (*why && !work->choice.met)
+        http_add_header(x, "X-Penumbra-Warning", "%s", why);
+    for (uint32_t i = 0; i < result->warning_count && i < 3; i++)
+        http_add_header(x, "X-Penumbra-Warning", "%s", result->warnings[i]);
+}
+
 /* The picture's own headers; `total_ms` counts from the last byte of the request. */
 static void add_picture_headers(struct call *call, double total_ms)
 {
     struct http_exchange *x = call->exchange;
     const struct rendering *work = call->work;
     const struct pen_result *result = &work->picture->result;
-    const char *why = work->choice.why;
     char timing[560];
     if (call->note.cached)
         snprintf(timing, sizeof timing, "cache;desc=\"hit\", total;dur=%.3f", total_ms);
@@ -242,12 +285,7 @@ static void add_picture_headers(struct call *call, double total_ms)
     /* Keep it, but ask: a restart may change it. What had to end early comes out otherwise each time. */
     bool complete = result->progress.done >= result->progress.total;
     http_add_header(x, "Cache-Control", complete ? "no-cache" : "no-store");
-    if (*why)
-        http_add_header(x, "X-Penumbra-Choice", "%s", why);
-    if (*why && !work->choice.met)
-        http_add_header(x, "X-Penumbra-Warning", "%s", why);
-    for (uint32_t i = 0; i < result->warning_count && i < 3; i++)
-        http_add_header(x, "X-Penumbra-Warning", "%s", result->warnings[i]);
+    add_warnings(call, work->picture);
 }
 
 static void release_picture(void *picture)
@@ -273,13 +311,16 @@ static enum step_end answer(struct call *call, struct pen_error *error)
     struct call_note *note = &call->note;
     double total_ms = clock_ms(clock_now_ns() - x->body_ns);
     char href[PEN_ID_HEX + 16];
+    if (work->parts) {
+        add_warnings(call, parts_first(work->parts));
+        parts_answer(work->parts);
+        return STEP_OVER;
+    }
     snprintf(href, sizeof href, "/v1/results/%s", picture->tag);
-    for (int stage = PEN_STAGE_LOAD; stage < PEN_STAGES; stage++)
-        note->render_ms += picture->result.stage_ms[stage];
     if (!note->cached && total_ms >= note->render_ms)
         metrics_overhead(s->metrics, total_ms - note->render_ms - note->queue_ms);
     add_picture_headers(call, total_ms);
-    if (work->wants_record) {
+    if (work->form == ACCEPT_RECORD) {
         bool kept = picture_cost(picture) <= s->config->result_cache.bytes;
         struct pen_record_extra extra = {.request_id = x->request_id,
             .image_href = kept ? href : NULL,
@@ -302,6 +343,7 @@ static void end_rendering(struct call *call, void *given)
     struct rendering *work = given;
     if (work->holds_share)
         scheduler_release(call->service->scheduler, call->client);
+    parts_leave(work->parts);
     picture_release(work->picture);
 }
 
@@ -337,6 +379,8 @@ bool route_result(struct call *call, struct pen_error *error)
     char tag[PEN_ID_HEX + 1];
     pen_id_to_hex(call->address.id, tag);
     struct picture *picture = result_cache_get(call->service->cache, tag);
+    if (!picture)
+        picture = result_cache_get(call->service->part_cache, tag);
     if (!picture)
         return pen_fail(
             error, PEN_NOT_FOUND, "", "The result is not kept any more: render it again.");

@@ -179,5 +179,6 @@ class Document:
         elif method != "HEAD":
             assert kind in content, "%s: %s is not in the document" % (said, kind)
             schema = content[kind].get("schema")
-            wrong = self.problems(json.loads(answer.body), schema) if schema else []
+            value = json.loads(answer.body) if kind.endswith("json") else answer.body.decode("latin-1")
+            wrong = self.problems(value, schema) if schema else []
             assert not wrong, "%s:\n  %s" % (said, "\n  ".join(wrong[:8]))

@@ -80,11 +80,21 @@ static void test_accept(void)
         {",,,image/png", "image/png", true}};
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++)
         CHECK(accept_allows(rows[i].accept, rows[i].type) == rows[i].allowed);
-    CHECK(accept_record("application/json"));
-    CHECK(accept_record("application/json, */*;q=0.5"));
-    CHECK(!accept_record("*/*"));
-    CHECK(!accept_record(NULL));
-    CHECK(!accept_record("image/png, application/json;q=0.5"));
+    CHECK(accept_form("application/json") == ACCEPT_RECORD);
+    CHECK(accept_form("application/json, */*;q=0.5") == ACCEPT_RECORD);
+    CHECK(accept_form("*/*") == ACCEPT_PICTURE);
+    CHECK(accept_form(NULL) == ACCEPT_PICTURE);
+    CHECK(accept_form("") == ACCEPT_PICTURE);
+    CHECK(accept_form("image/png, application/json;q=0.5") == ACCEPT_PICTURE);
+    CHECK(accept_form("Multipart/X-Mixed-Replace") == ACCEPT_PARTS);
+    CHECK(accept_form("multipart/x-mixed-replace, image/webp;q=0.9") == ACCEPT_PARTS);
+    CHECK(accept_form("multipart/*, image/*;q=0.1") == ACCEPT_PICTURE);
+    CHECK(accept_form("multipart/x-mixed-replace;q=0") == ACCEPT_PICTURE);
+    CHECK(accept_form("text/event-stream") == ACCEPT_EVENTS);
+    CHECK(accept_form("text/event-stream, application/json;q=0.9") == ACCEPT_EVENTS);
+    CHECK(accept_form("text/event-stream, application/json") == ACCEPT_RECORD);
+    CHECK(
+        accept_form("text/event-stream;q=0.5, application/json;q=0.4, */*;q=0.1") == ACCEPT_EVENTS);
 }
 
 /* Every code has a status of its class, and what comes from elsewhere is made safe. */

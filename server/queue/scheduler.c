@@ -45,13 +45,17 @@ void scheduler_destroy(struct scheduler *s)
     free(s);
 }
 
-/* What a render will still take of the renderer; of one without an estimate `unknown_ms`. */
+/* What a render will still take of the renderer; of one without an estimate `unknown_ms`. None goes on
+ * when nobody waits for it. */
 static double left_ms(const struct scheduler *s, const struct render *r, double unknown_ms)
 {
+    uint64_t now = s->limits.now_ns();
     double ms = r->estimate.ms < 0 ? unknown_ms : r->estimate.ms;
+    if (!r->waiters || r->last_deadline_ns < now)
+        return 0;
     if (r->running) /* at most: it shared the renderer with the others */
-        ms -= clock_ms(s->limits.now_ns() - r->taken_ns) / fmax(1, s->numbers.running);
-    return fmax(0, ms);
+        ms -= clock_ms(now - r->taken_ns) / fmax(1, s->numbers.running);
+    return fmax(0, fmin(ms, clock_ms(r->last_deadline_ns - now)));
 }
 
 /* Everything that is there, on all workers together. */

@@ -241,6 +241,17 @@ static void test_correction(void)
     }
     CHECK(refused > 0 && refused < 10);
     scheduler_cancel(s);
+    /* What has ended by its own deadline is in nobody's way. */
+    CHECK(submit(s, &c[next++], (struct ask){"c", 1, false, 1, 0, 0}));
+    CHECK(run(s, 60000, 0, &seen));
+    CHECK(submit(s, &c[next++], (struct ask){"c", 1, false, 1, 1000, 0}));
+    struct render *late = scheduler_take(s, &(struct taker){fits, NULL, 0});
+    CHECK(!submit(s, &c[next], (struct ask){"c", 1, false, 1, 900, 0}));
+    now_ns += 1100 * MS;
+    scheduler_expire(s);
+    CHECK(submit(s, &c[next++], (struct ask){"c", 1, false, 1, 1000, 0}));
+    scheduler_finish(s, late, &(struct outcome){.error = {.code = PEN_LOST}});
+    scheduler_cancel(s);
     /* Nobody is made to wait by what is long past. */
     CHECK(submit(s, &c[next++], (struct ask){"b", 1, false, 1, 0, 0}));
     CHECK(run(s, 60000, 0, &seen));

@@ -1,4 +1,5 @@
 #include "clients/cli/render.h"
+#include "clients/cli/parts.h"
 #include "clients/cli/request_args.h"
 #include "clients/cli/upload.h"
 #include "protocol/request.h"
@@ -126,6 +127,18 @@ int cli_upload_textures(const struct cli_server *server, cJSON *root)
     return CLI_OK;
 }
 
+/* What the answer says besides the picture. */
+static void tell(const struct cli_server *server, struct cli_answer *answer, const char *path)
+{
+    for (char *at = answer->warnings, *line; (line = strsep(&at, "\n"));)
+        if (*line)
+            fprintf(stderr, "warning: %s\n", line);
+    if (answer->choice[0])
+        fprintf(stderr, "chosen: %s\n", answer->choice);
+    if (server->verbose)
+        fprintf(stderr, "%s: %zu bytes; %s\n", path, answer->bytes, answer->timing);
+}
+
 int cli_save_image(const struct cli_server *server, struct cli_call *call, const char *path)
 {
     struct cli_answer answer = {0};
@@ -146,13 +159,8 @@ int cli_save_image(const struct cli_server *server, struct cli_call *call, const
         status = cli_fail(CLI_FAILED, "%s cannot be written.", path);
     if (status != CLI_OK && sink && !to_stdout)
         unlink(part);
-    for (char *at = answer.warnings, *line; status == CLI_OK && (line = strsep(&at, "\n"));)
-        if (*line)
-            fprintf(stderr, "warning: %s\n", line);
-    if (status == CLI_OK && answer.choice[0])
-        fprintf(stderr, "chosen: %s\n", answer.choice);
-    if (status == CLI_OK && server->verbose)
-        fprintf(stderr, "%s: %zu bytes; %s\n", path, answer.bytes, answer.timing);
+    if (status == CLI_OK)
+        tell(server, &answer, path);
     cli_answer_finish(&answer);
     free(part);
     return status;
@@ -176,6 +184,16 @@ static int print_record(const struct cli_server *server, struct cli_call *call, 
             *image = cli_format("%s", href->valuestring);
     }
     cJSON_Delete(record);
+    cli_answer_finish(&answer);
+    return status;
+}
+
+static int save_parts(const struct cli_server *server, struct cli_call *call, const char *path)
+{
+    struct cli_answer answer;
+    int status = cli_save_parts(server, call, path, &answer);
+    if (status == CLI_OK)
+        tell(server, &answer, path);
     cli_answer_finish(&answer);
     return status;
 }
@@ -204,7 +222,10 @@ static int render(const struct options *options, cJSON *root)
             call.path = image;
             call.content_type = call.body = NULL;
         }
-        status = cli_save_image(server, &call, options->output);
+        bool gets_better =
+            !image && cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(root, "progressive"));
+        status = gets_better ? save_parts(server, &call, options->output)
+                             : cli_save_image(server, &call, options->output);
     }
     free(image);
     free(path);

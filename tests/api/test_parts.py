@@ -8,6 +8,7 @@ import re
 import signal
 import socket
 import struct
+import subprocess
 import threading
 import time
 import unittest
@@ -348,6 +349,37 @@ class Parts(unittest.TestCase):
             self.assertTrue(closed)
             self.assertGreaterEqual(len(self.samples(parts)), 1)
             self.assertEqual(parts[-1][1], plain)
+
+    def test_command_line(self):
+        """The file is a whole picture at any time, and the plain answer at the end."""
+        path = os.path.join(self.d.folder, "better.png")
+        command = [os.path.join(harness.BIN, "penumbra"), "render", self.scene, "--server",
+                   "http://127.0.0.1:%d" % self.d.port, "--technique", "multisample", "--set",
+                   "samples=256", "--set", "map_size=128", "--width", "64", "--height", "48",
+                   "--deadline-ms", "3600000", "--progressive", "-v", "-o"]
+        with self.d.paused():
+            client = subprocess.Popen(command + [path], stderr=subprocess.PIPE)
+            wait(lambda: self.running() == 1)
+        seen = set()
+        while client.poll() is None:
+            if os.path.exists(path):
+                with open(path, "rb") as file:
+                    seen.add(file.read())
+            time.sleep(0.002)
+        said = client.stderr.read()
+        client.stderr.close()
+        self.assertEqual(client.returncode, 0, said)
+        pictures = int(re.search(rb"^(\d+) pictures$", said, re.M)[1])
+        self.assertGreaterEqual(pictures, 2)
+        for picture in seen:
+            texts(picture)
+        plain = self.d.render(self.scene, REFINED, fresh=False).body
+        with open(path, "rb") as file:
+            self.assertEqual(file.read(), plain)
+        self.assertFalse(os.path.exists(path + ".part"))
+        piped = subprocess.run(command + ["-"], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
+                               check=True)
+        self.assertEqual(piped.stdout, plain)
 
     def test_slow_readers(self):
         """One that reads next to nothing gets next to no pictures, and nothing piles up for it."""

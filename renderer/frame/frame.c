@@ -24,6 +24,8 @@
 #define SHARED_ROWS "renderer/shaders/frame/average.def"
 #include "renderer/shared/rows_c.h"
 
+#define SKETCH_SAMPLES 16
+
 struct frame {
     const struct frame_job *job;
     struct view view;
@@ -36,6 +38,8 @@ struct frame {
     bool coarse;     /* said of one light */
     uint32_t number; /* of the jittered frame */
     bool sky_known;  /* of this jittered frame */
+    bool sketching;  /* few samples of each light are taken, so that there is something of all */
+    bool sketched;   /* that is done */
     struct frame_work work;
     struct frame_progress progress;
     struct technique_watch watch;
@@ -155,11 +159,12 @@ static bool bound_faces(struct frame *f, struct technique_run *run, struct pen_e
     return true;
 }
 
-/* Of the first jittered frame, when all that is drawn before is complete. The next ones are mixed in
+/* Of the first jittered frame, when there is something of all lights. The next ones are mixed in
  * whole. */
 static bool is_watchable(const struct frame *f, uint32_t light, uint32_t face)
 {
-    return f->number == 0 && light + 1 == f->light_count && face + 1 == f->lights[light].face_count;
+    bool last = light + 1 == f->light_count && face + 1 == f->lights[light].face_count;
+    return f->number == 0 && (last || f->sketched) && !f->sketching;
 }
 
 static bool record_face(
@@ -189,11 +194,14 @@ static bool record_face(
         .frame = f->number,
         .light_index = light,
         .watch = is_watchable(f, light, number) ? &f->watch : NULL,
-        .variance_framebuffer = frame_layers_want_error(job->request, job->technique)
-                                    ? job->targets->variance.framebuffer
-                                    : 0};
+        .variance_framebuffer =
+            !f->sketching && frame_layers_want_error(job->request, job->technique)
+                ? job->targets->variance.framebuffer
+                : 0};
     if (!job->technique->record(&run, error))
         return false;
+    if (f->sketching)
+        return bound_faces(f, &run, error);
     if (f->number == 0)
         f->coarse = f->coarse || frame_warn_of_resolution(&run);
     *counted |= run.work_counted;
@@ -208,10 +216,66 @@ static bool record_light(struct frame *f, uint32_t light, struct pen_error *erro
 {
     bool counted = false;
     for (uint32_t k = 0; k < f->lights[light].face_count; k++)
-        if (!record_face(f, light, k, &counted, error))
+        if (!f->progress.stopped && !record_face(f, light, k, &counted, error))
             return false;
     f->work.lights[f->number] += !counted;
     return true;
+}
+
+static void upload_params(const struct frame *f)
+{
+    const struct pen_request *r = f->job->request;
+    gl.NamedBufferData(
+        f->job->ctx->param_block, sizeof r->technique_params, r->technique_params, GL_STREAM_DRAW);
+}
+
+static void aim_light(const struct frame *f, uint32_t light)
+{
+    const struct gl_target *vis = &f->job->targets->vis;
+    f->job->ctx->turns.light = light;
+    gl_target_aim(vis, 0, light);
+    /* What an unshadowed receiver sees. */
+    if (!f->sketched)
+        gl_target_clear(vis, f->lights[light].faces[0].emission_mean);
+}
+
+static bool sketch_lights(struct frame *f, struct pen_error *error)
+{
+    bool counted;
+    upload_params(f);
+    for (uint32_t i = 0; i < f->light_count; i++) {
+        aim_light(f, i);
+        for (uint32_t k = 0; k < f->lights[i].face_count; k++)
+            if (!record_face(f, i, k, &counted, error))
+                return false;
+    }
+    return true;
+}
+
+/* Somebody looks, and there are several lights, or faces of one: SKETCH_SAMPLES of each come first,
+ * or there would be nothing to see before the last is at work. */
+static bool sketch(struct frame *f, struct pen_error *error)
+{
+    struct pen_request *r = f->job->request;
+    const struct pen_param *row = pen_param_find(f->job->technique->info.params, "samples");
+    const double few = SKETCH_SAMPLES;
+    uint32_t asked = 0, units = 0, params[PEN_TECHNIQUE_PARAM_BYTES / 4];
+    for (uint32_t i = 0; i < f->light_count; i++)
+        units += f->lights[i].face_count;
+    if (row)
+        memcpy(&asked, (const char *)r->technique_params + row->offset, sizeof asked);
+    if (units < 2 || !f->progress.tracked || asked < 4 * SKETCH_SAMPLES)
+        return true;
+    struct pen_result before = *f->result;
+    memcpy(params, r->technique_params, sizeof params);
+    pen_param_store(row, r->technique_params, &few, "", NULL);
+    f->sketching = true;
+    f->sketched = sketch_lights(f, error);
+    f->sketching = false;
+    memcpy(before.completed.technique_params, params, sizeof params);
+    *f->result = before; /* it counts nothing */
+    frame_progress_sketch(&f->progress, units, SKETCH_SAMPLES);
+    return f->sketched;
 }
 
 /* The sky's shadow of this jittered frame. */
@@ -232,16 +296,15 @@ static bool record_visibility(struct frame *f, struct pen_error *error)
         return false;
     if (f->number == 0)
         f->progress.ahead_ms = f->progress.step_ms = frame_progress_ms(&f->progress);
-    gl.NamedBufferData(job->ctx->param_block, sizeof job->request->technique_params,
-        job->request->technique_params, GL_STREAM_DRAW);
-    for (uint32_t i = 0; i < f->light_count; i++) {
-        job->ctx->turns.light = i;
-        gl_target_aim(&job->targets->vis, 0, i);
-        /* What an unshadowed receiver sees. */
-        gl_target_clear(&job->targets->vis, f->lights[i].faces[0].emission_mean);
+    if (f->number == 0 && !sketch(f, error))
+        return false;
+    upload_params(f);
+    for (uint32_t i = 0; i < f->light_count && !f->progress.stopped; i++) {
+        aim_light(f, i);
         if (!record_light(f, i, error))
             return false;
     }
+    f->sketched = false;
     return !f->work.lights[f->number] ||
            frame_layers_count_receivers(job, f->number, &f->work, error);
 }
@@ -399,19 +462,21 @@ static enum technique_step on_step(struct technique_run *run, uint32_t done, uin
 {
     struct frame *f = container_of(run->watch, struct frame, watch);
     f->result->progress.done = done; /* something is there */
-    return frame_progress_step(&f->progress, done, total);
+    uint32_t unit = (uint32_t)(run->face - run->light->faces);
+    for (uint32_t i = 0; i < run->light_index; i++)
+        unit += f->lights[i].face_count;
+    return frame_progress_step(&f->progress, unit, done, total);
 }
 
 static bool on_show(struct technique_run *run, struct pen_error *error)
 {
     struct frame *f = container_of(run->watch, struct frame, watch);
     struct frame_progress *p = &f->progress;
-    double begin_ms = frame_progress_ms(p);
     struct technique_run bounded = *run;
     bool ok = bound_faces(f, &bounded, error) && frame_progress_compare(p, error) &&
               (!p->show_wanted || !can_show_estimate(f->job->request) || show_estimate(f, error));
     aim_face(f, (struct light_face *)run->face);
-    frame_progress_spent(p, begin_ms);
+    frame_progress_spent(p);
     return ok;
 }
 
@@ -424,10 +489,9 @@ static bool look_up(struct frame *f, bool *enough, struct pen_error *error)
     *enough = step == STEP_STOP;
     if (step != STEP_SHOW)
         return true;
-    double begin_ms = frame_progress_ms(p);
     bool ok =
         frame_progress_compare(p, error) && (!p->show_wanted || show_frame(f, p->frames, error));
-    frame_progress_spent(p, begin_ms);
+    frame_progress_spent(p);
     return ok;
 }
 

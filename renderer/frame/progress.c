@@ -28,10 +28,12 @@ double frame_progress_ms(const struct frame_progress *p)
     return turns->used_ms + gl_now_ms() - turns->since_ms;
 }
 
-void frame_progress_spent(struct frame_progress *p, double begin_ms)
+void frame_progress_spent(struct frame_progress *p)
 {
-    p->last_extra_ms = frame_progress_ms(p) - begin_ms;
+    double now = frame_progress_ms(p);
+    p->last_extra_ms = now - p->step_ms;
     p->extra_ms += p->last_extra_ms;
+    p->step_ms = now;
 }
 
 /* The next batch is taken for half again as long as the last, and what is left to do of the picture
@@ -59,6 +61,8 @@ static enum technique_step step(struct frame_progress *p, uint32_t samples)
     const struct pen_viewer *viewer = &p->job->viewer;
     bool first = !p->shown && !p->kept_done;
     double share = fmax(viewer->share, LEAST_SHARE);
+    /* More at the beginning, when there is most to see; in the end it is the share of all. */
+    share *= sqrt((double)p->total * p->job->request->antialias / samples);
     if (!first && p->extra_ms + p->last_extra_ms > share * now)
         return STEP_GO_ON;
     p->show_wanted = viewer->wants && viewer->wants(viewer->context);
@@ -66,11 +70,26 @@ static enum technique_step step(struct frame_progress *p, uint32_t samples)
     return p->show_wanted || compare ? STEP_SHOW : STEP_GO_ON;
 }
 
-enum technique_step frame_progress_step(struct frame_progress *p, uint32_t done, uint32_t total)
+void frame_progress_sketch(struct frame_progress *p, uint32_t units, uint32_t samples)
 {
-    p->done = done;
+    p->units = units;
+    p->sketched = samples;
+}
+
+enum technique_step frame_progress_step(
+    struct frame_progress *p, uint32_t unit, uint32_t done, uint32_t total)
+{
     p->total = total;
-    return done < total ? step(p, p->frames * total + done) : STEP_GO_ON;
+    p->done = done;
+    if (p->units) {
+        double sum = (double)unit * total + fmax(done, p->sketched) +
+                     (double)(p->units - unit - 1) * p->sketched;
+        p->done = (uint32_t)(sum / p->units);
+    }
+    /* What there was of this light before was better. */
+    if (done == total || done < p->sketched)
+        return STEP_GO_ON;
+    return step(p, p->frames * total + p->done);
 }
 
 enum technique_step frame_progress_next(struct frame_progress *p)
@@ -172,6 +191,7 @@ void frame_progress_tell(struct frame_progress *p, struct pen_result *result)
     result->progress = (struct pen_progress){.number = p->shown++,
         .done = p->frames * p->total + p->done,
         .total = total,
-        .standard_error = p->standard_error,
+        /* Lights of unlike numbers of samples: what moves least may be what is farthest off. */
+        .standard_error = p->units ? -1 : p->standard_error,
         .elapsed_ms = (float)(gl_now_ms() - p->begun_ms)};
 }

@@ -6,19 +6,20 @@
 struct frame_progress {
     const struct frame_job *job;
     uint32_t lights;
-    bool tracked;         /* estimates of its error are wanted */
-    bool stopped;         /* before the last sample */
-    bool begun;           /* there is an estimate */
-    bool late;            /* there was none in time */
-    double begun_ms;      /* gl_now_ms */
-    double ahead_ms;      /* of the render's own time, before the first sample */
-    double extra_ms;      /* that pictures and estimates took, of the render's own time */
-    double last_extra_ms; /* the last of them */
-    double step_ms;       /* the render's time at the last step, */
-    double increment_ms;  /* and between the last two */
-    uint32_t shown;       /* pictures */
-    uint32_t frames;      /* jittered ones that are complete */
-    uint32_t done, total; /* samples of the frame at hand */
+    bool tracked;             /* estimates of its error are wanted */
+    bool stopped;             /* before the last sample */
+    bool begun;               /* there is an estimate */
+    bool late;                /* there was none in time */
+    double begun_ms;          /* gl_now_ms */
+    double ahead_ms;          /* of the render's own time, before the first sample */
+    double extra_ms;          /* that pictures and estimates took, of the render's own time */
+    double last_extra_ms;     /* the last of them */
+    double step_ms;           /* the render's time at the last step, */
+    double increment_ms;      /* and between the last two */
+    uint32_t shown;           /* pictures */
+    uint32_t frames;          /* jittered ones that are complete */
+    uint32_t done, total;     /* samples of the frame at hand, the mean of its lights */
+    uint32_t units, sketched; /* see frame_progress_sketch; 0: none */
     /* The mean visibility after so many samples, in targets->means[]: as it is now, and an earlier
      * one to compare it with. */
     uint32_t now, now_done, kept, kept_done; /* done 0: none */
@@ -29,15 +30,19 @@ struct frame_progress {
 void frame_progress_begin(struct frame_progress *p, const struct frame_job *job, uint32_t lights);
 /* Somebody may want what is not complete. */
 bool frame_progress_is_limited(const struct frame_progress *p);
-/* What is to be done with an estimate from `done` of `total` samples of the frame at hand. */
-enum technique_step frame_progress_step(struct frame_progress *p, uint32_t done, uint32_t total);
+/* Of each of so many lights or faces of one there are a few samples. */
+void frame_progress_sketch(struct frame_progress *p, uint32_t units, uint32_t samples);
+/* What is to be done with an estimate from `done` of `total` samples of light or face `unit` of the
+ * frame at hand. */
+enum technique_step frame_progress_step(
+    struct frame_progress *p, uint32_t unit, uint32_t done, uint32_t total);
 /* Another jittered frame is complete; STEP_STOP: there is no time for the next one. */
 enum technique_step frame_progress_next(struct frame_progress *p);
 /* vis holds an estimate for all lights: takes its mean in, and estimates the error from what it
  * differs from an earlier one. */
 bool frame_progress_compare(struct frame_progress *p, struct pen_error *error);
-/* Time since `begin_ms`, of the render's own, was spent on a picture or an estimate. */
-void frame_progress_spent(struct frame_progress *p, double begin_ms);
+/* All since the last step was spent on a picture or an estimate. */
+void frame_progress_spent(struct frame_progress *p);
 /* The time that the render has had so far. */
 double frame_progress_ms(const struct frame_progress *p);
 /* Says in the result how far the next picture got. */

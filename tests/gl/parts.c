@@ -151,6 +151,19 @@ int main(void)
         make_request(&request, scene, names[i], 2);
         check_watching(r, &request);
     }
+    for (int i = 0; i < 2; i++) { /* something of all lights is there first */
+        make_request(&request, scene, names[i], 1);
+        request.lights_given = true;
+        request.light_count = 2;
+        for (int k = 0; k < 2; k++) {
+            pen_light_default(&request.lights[k], !k  ? PEN_LIGHT_RECT
+                                                  : i ? PEN_LIGHT_SPHERE
+                                                      : PEN_LIGHT_DISK);
+            request.lights[k].position[0] = 2 * k, request.lights[k].position[1] = 4;
+            request.lights[k].position[2] = 1;
+        }
+        check_watching(r, &request);
+    }
     for (int i = 0; i < 2; i++) {
         make_request(&request, scene, names[i], 1);
         request.output.layer = PEN_LAYER_VISIBILITY;

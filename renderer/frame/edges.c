@@ -1,7 +1,13 @@
 #include "renderer/frame/edges.h"
 #include "renderer/frame/needs.h"
+#include "renderer/passes/draw/passes.h"
 #include "renderer/passes/draw/places.h"
 #include "renderer/passes/draw/screen.h"
+#include "renderer/passes/draw/tiles.h"
+#include "renderer/passes/draw/turn.h"
+
+#define SHARED_ROWS "renderer/shaders/screen/open_tiles.def"
+#include "renderer/shared/rows_c.h"
 
 #define BAND_PIXELS (4u << 20) /* whose places are in memory together: 64 MiB */
 
@@ -12,8 +18,37 @@ bool frame_edges_are_smooth(const struct frame_job *job)
            frame_needs(r, PEN_SOURCE_BEAUTY);
 }
 
+/* What shows no edge stays as it is. Software rasterisers run all of a shader for every pixel, so
+ * only tiles with edges are drawn. */
+static bool find_tiles(
+    const struct frame_job *job, const struct gl_texture **tiles, struct pen_error *error)
+{
+    static const struct pass_targets key = {1};
+    struct gl_target *target = pass_targets(job->ctx, &key);
+    uint32_t width = (job->request->width + OPEN_TILE - 1) / OPEN_TILE;
+    uint32_t height = (job->request->height + OPEN_TILE - 1) / OPEN_TILE;
+    gl_target_fit(target, GL_RG8, width, height, 0, 1);
+    struct open_tiles_block block = {.tile = {OPEN_TILE}};
+    struct pass_texture depth = {
+        UNIT_DEPTH, job->targets->gbuffer.depth.texture.name, GL_SAMPLE_NEAREST};
+    *tiles = &target->texture;
+    return pass_fill(job->ctx,
+        &(struct pass_fill){.name = "edge tiles",
+            .fragment = "edge_tiles.frag",
+            .stage = PEN_STAGE_SHADE,
+            .textures = &depth,
+            .texture_count = 1,
+            .framebuffer = target->framebuffer,
+            .width = width,
+            .height = height,
+            .extra = &block,
+            .extra_bytes = sizeof block},
+        error);
+}
+
 static bool blend(const struct frame_job *job, const struct gl_texture *picture,
-    const char *defines, const struct edges_block *block, struct pen_error *error)
+    const char *defines, const struct edges_block *block, const struct gl_texture *tiles,
+    struct pen_error *error)
 {
     struct frame_targets *t = job->targets;
     struct pass_texture textures[] = {
@@ -31,9 +66,27 @@ static bool blend(const struct frame_job *job, const struct gl_texture *picture,
             .framebuffer = t->color.framebuffer,
             .width = job->request->width,
             .height = job->request->height,
+            .tiles = tiles,
+            .tile_px = OPEN_TILE,
             .extra = block,
             .extra_bytes = sizeof *block},
         error);
+}
+
+/* What the file holds without edges. */
+static bool fill(const struct frame_job *job, bool resolved, bool raw, struct pen_error *error)
+{
+    struct frame_targets *t = job->targets;
+    const struct pen_request *r = job->request;
+    struct edges_block all = {.rows = {0, (int32_t)r->height}};
+    if (!resolved)
+        return blend(job, &t->beauty.texture,
+            raw ? "#define ALONE\n#define RAW\n" : "#define ALONE\n", &all, NULL, error);
+    gl_timer_begin(&job->ctx->timer, PEN_STAGE_SHADE, "edges");
+    gl.CopyImageSubData(t->stairs.texture.name, GL_TEXTURE_2D, 0, 0, 0, 0, t->color.texture.name,
+        GL_TEXTURE_2D, 0, 0, 0, 0, (GLsizei)r->width, (GLsizei)r->height, 1);
+    gl_timer_end(&job->ctx->timer);
+    return pass_turn(job->ctx, error);
 }
 
 bool frame_edges_blend(const struct frame_job *job, const struct view *view, bool resolved,
@@ -43,16 +96,17 @@ bool frame_edges_blend(const struct frame_job *job, const struct view *view, boo
     const struct pen_request *r = job->request;
     const char *defines = resolved ? "#define RESOLVED\n" : raw ? "#define RAW\n" : NULL;
     uint32_t most = BAND_PIXELS / r->width;
-    for (uint32_t first = 0; first < r->height; first += most) {
+    const struct gl_texture *tiles;
+    if (!fill(job, resolved, raw, error) || !find_tiles(job, &tiles, error))
+        return false;
+    bool ok = true;
+    for (uint32_t first = 0; ok && first < r->height; first += most) {
         uint32_t rows = r->height - first < most ? r->height - first : most;
         struct edges_block block;
-        if (!pass_places(
-                job->ctx, job->scene, view, r->ground.on, first, rows, &t->places, &block, error))
-            return false;
-        bool ok =
-            blend(job, resolved ? &t->stairs.texture : &t->beauty.texture, defines, &block, error);
-        if (!ok)
-            return false;
+        ok = pass_places(job->ctx, job->scene, view, r->ground.on, first, rows, &t->places, &block,
+                 error) &&
+             blend(job, resolved ? &t->stairs.texture : &t->beauty.texture, defines, &block, tiles,
+                 error);
     }
-    return true;
+    return ok;
 }

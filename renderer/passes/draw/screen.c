@@ -179,7 +179,7 @@ bool pass_screen(struct technique_run *run, const struct pass_screen *pass, stru
 
 bool pass_fill(struct technique_ctx *ctx, const struct pass_fill *pass, struct pen_error *error)
 {
-    struct gl_program_desc desc = {.vertex = "screen.vert",
+    struct gl_program_desc desc = {.vertex = pass->tiles ? "tiles.vert" : "screen.vert",
         .fragment = pass->fragment,
         .defines = pass->defines,
         .info = pass->info,
@@ -191,6 +191,9 @@ bool pass_fill(struct technique_ctx *ctx, const struct pass_fill *pass, struct p
         .height = pass->height,
         .add = pass->add,
         .mute = pass->mute,
+        .tiles = pass->tiles,
+        .tile_class = TILE_UNDECIDED,
+        .tile_px = pass->tile_px ? (int32_t)pass->tile_px : CLASSIFY_TILE,
         .textures = pass->textures,
         .texture_count = pass->texture_count};
     if (!d.program)

@@ -40,7 +40,9 @@ struct pass_fill {
     GLuint framebuffer;
     uint32_t width, height;
     bool add;
-    bool mute; /* no colour is written: the pass counts */
+    bool mute;                      /* no colour is written: the pass counts */
+    const struct gl_texture *tiles; /* as above */
+    uint32_t tile_px;
     const void *extra;
     uint32_t extra_bytes;
     const struct pen_technique_info *info; /* parameters for P(name), or NULL */

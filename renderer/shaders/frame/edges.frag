@@ -2,12 +2,13 @@
 // known; each takes its light from those of the 3 x 3 pixels around whose planes pass through it.
 // RESOLVED: the picture holds display values, else sums; RAW: a file of radiance is wanted. Else it
 // is light as the display gives it off that is averaged: what is too bright for it has no stairs.
+// ALONE: only what the file holds of each pixel without its neighbours.
 #include "view.glsl"
 #include "octahedral.glsl"
 #include "display.glsl"
+#include "edge_pixel.glsl"
 #include "edges.def"
 
-layout(binding = UNIT_DEPTH) uniform sampler2D g_depth;
 layout(binding = UNIT_NORMAL) uniform sampler2D g_normal;
 layout(binding = UNIT_PLACES) uniform sampler2DMS place_depths; // of some rows
 layout(binding = UNIT_SOURCE) uniform sampler2D picture;
@@ -35,11 +36,6 @@ vec4 light_of(vec4 c)
 #else
     return vec4(srgb_decode(c.rgb) * c.a, c.a);
 #endif
-}
-
-float depth_at(ivec2 pixel)
-{
-    return texelFetch(g_depth, pixel, 0).r;
 }
 
 // Reversed depth is linear in the picture along a plane: its value at the pixel's centre, and its
@@ -71,14 +67,9 @@ void main()
     if (pixel.y < edge.rows.x || pixel.y >= edge.rows.x + edge.rows.y)
         discard;
     color = alone(texelFetch(picture, pixel, 0));
-    // Along a plane a depth is the mean of those on either side. Cheaper than to read all places.
-    ivec2 before = max(pixel - 1, ivec2(0)), after = min(pixel + 1, last);
-    vec2 low = vec2(depth_at(ivec2(before.x, pixel.y)), depth_at(ivec2(pixel.x, before.y)));
-    vec2 high = vec2(depth_at(ivec2(after.x, pixel.y)), depth_at(ivec2(pixel.x, after.y)));
-    float depth = depth_at(pixel);
-    vec2 bend = abs(low + high - 2.0 * depth), rise = abs(low - high) + 1e-4 * depth;
+#ifndef ALONE
     // Loops, since software rasterisers leave them out where no pixel needs them.
-    int around = max(bend.x, bend.y) > 0.1 * (rise.x + rise.y) ? 9 : 0;
+    int around = may_show_edge(pixel, last) ? 9 : 0;
     vec3 right = vec3(0.0), up = vec3(0.0);
     vec4 depths = vec4(0.0), open = vec4(0.0);
     for (int once = 0; once < around; once += 9) {
@@ -112,4 +103,5 @@ void main()
         color.rgb = light.a > 0.0 ? srgb_encode(light.rgb / light.a) : vec3(0.0);
 #endif
     }
+#endif
 }

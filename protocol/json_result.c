@@ -108,6 +108,13 @@ char *pen_result_json(const struct pen_result *result, const struct pen_record_e
         pen_json_uint(&json, NULL, result->subdivided_pixels[level]);
     pen_json_end(&json);
     pen_json_end(&json);
+    if (pen_request_is_stateful(completed, catalogue)) {
+        pen_json_object(&json, "history");
+        pen_json_string(&json, "session", completed->delivery.session);
+        pen_json_uint(&json, "frames", result->history_frames);
+        pen_json_double(&json, "share", (double)result->history_share);
+        pen_json_end(&json);
+    }
     pen_json_uint(&json, "triangles_drawn", result->triangles_drawn);
     pen_json_uint(&json, "rays", result->rays);
     pen_json_uint(&json, "shadow_maps", result->shadow_maps);

@@ -87,10 +87,12 @@ static void write_image_headers(struct pen_json *json)
         {"ETag", "Strong; the same request gives the same image."},
         {"Server-Timing", "Milliseconds per stage."},
         {"X-Penumbra-Choice", "Why this method was taken, when auto was asked for."},
+        {"X-Penumbra-History", "Of a session's image: how many before it, and what share of its "
+                               "pixels, it rests on. There is no ETag then."},
         {"X-Penumbra-Warning", "What the method could not do; once per warning."},
     };
     pen_json_object(json, "headers");
-    for (int i = 0; i < 4; i++) {
+    for (int i = 0; i < 5; i++) {
         pen_json_object(json, headers[i][0]);
         pen_json_string(json, "description", headers[i][1]);
         pen_json_raw(json, "schema", "{\"type\":\"string\"}");

@@ -141,6 +141,9 @@ bool pen_param_store_text(const struct pen_param *row, void *object, const char 
 {
     char *to = (char *)object + row->offset;
     size_t length = strlen(text);
+    if (length > row->bytes - 1u && row->whole)
+        return pen_fail(
+            error, PEN_INVALID, pointer, "%s is longer than %u bytes.", row->name, row->bytes - 1u);
     if (length > row->bytes - 1u) {
         length = row->bytes - 1u;
         while (length && ((unsigned char)text[length] & 0xc0) == 0x80)

@@ -38,6 +38,7 @@ struct pen_param {
     uint8_t specialise; /* 1: a constant of the shader, one program per value: for what chooses its
                            code, not for counts and sizes */
     uint8_t exclusive_min; /* 1: min itself is not allowed */
+    uint8_t whole;         /* 1: a text that is too long is refused, not cut */
     uint8_t automatic; /* 1: left out, it holds PEN_AUTO until something that suits is chosen; def
                           is what such a choice starts from */
     const char *word;  /* may be given instead of numbers, or of true and false; NULL: none */

@@ -120,6 +120,12 @@ static const struct pen_param delivery_rows[] = {
     DELIVERY(progressive, .def = 0,
         .help = "The answer is a row of pictures that get better, as multipart/x-mixed-replace; "
                 "the last one is the plain answer. For an <img>; Accept asks for the same."),
+    DELIVERY(session, .whole = 1,
+        .help =
+            "A name of your own for a sequence of frames, one request after the other: a method "
+            "that goes on from the frame before (temporal) finds it by this name. Without one "
+            "every frame stands for itself, and other methods do not look at it. In a scene "
+            "without lights, the light stays where the first frame's camera put it."),
 };
 
 struct pen_param_table pen_request_table(void)
@@ -284,6 +290,13 @@ bool pen_request_check(const struct pen_request *request, const struct pen_catal
         return pen_fail(
             error, PEN_INVALID, "/output/layer", "All layers in one file need the exr format.");
     return true;
+}
+
+bool pen_request_is_stateful(
+    const struct pen_request *request, const struct pen_catalogue *catalogue)
+{
+    const struct pen_technique_info *info = pen_catalogue_find(catalogue, request->technique);
+    return request->delivery.session[0] && info && info->keeps_history;
 }
 
 bool pen_request_is_transparent(const struct pen_request *request)

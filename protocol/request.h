@@ -78,6 +78,9 @@ struct pen_delivery {
     uint32_t on_deadline; /* enum pen_on_deadline */
     uint32_t budget_ms;   /* 0: none */
     pen_flag progressive;
+    char session[PEN_NAME_BYTES]; /* of a method that goes on from the frame before, for which the
+                                   * answer depends on what came before in it */
+    uint32_t session_owner[2];    /* whose; filled on the way to a worker */
 };
 
 struct pen_request {
@@ -124,6 +127,9 @@ void pen_request_default(struct pen_request *request, const struct pen_catalogue
 /* Every default of one light of `type`. */
 void pen_light_default(struct pen_light *light, enum pen_light_type type);
 
+/* True when the answer depends on what was asked before: it is kept and shared nowhere. */
+bool pen_request_is_stateful(
+    const struct pen_request *request, const struct pen_catalogue *catalogue);
 /* True when the picture has an alpha channel: how much of a pixel the scene covers. */
 bool pen_request_is_transparent(const struct pen_request *request);
 

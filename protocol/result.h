@@ -77,11 +77,14 @@ struct pen_result {
     uint32_t full_work_pixels;     /* for which the method ran in full */
     uint32_t subdivided_pixels[2]; /* filter split once, twice */
     uint32_t triangles_drawn;
-    uint32_t shadow_maps; /* depth maps of light samples that the image rests on, drawn or kept;
+    uint32_t shadow_maps;    /* depth maps of light samples that the image rests on, drawn or kept;
                              summed over lights and jittered frames */
-    uint64_t rays;        /* of methods that trace */
-    uint64_t gpu_bytes;   /* resident scenes, images and shadow inputs */
-    uint64_t image_bytes; /* encoded size */
+    uint32_t history_frames; /* of the session, that the image rests on besides itself */
+    float history_share;     /* of its receivers, over all lights and jittered frames: of which the
+                                frame before knew something */
+    uint64_t rays;           /* of methods that trace */
+    uint64_t gpu_bytes;      /* resident scenes, images and shadow inputs */
+    uint64_t image_bytes;    /* encoded size */
     struct pen_progress progress;
     double estimate_ms; /* what it was expected to take of the renderer; < 0: nothing was known */
     double turns_ms;    /* that it had the renderer for itself, one turn after the other */

@@ -13,6 +13,7 @@ struct pen_technique_info {
     const char *artefacts; /* what is known to go wrong, one or two sentences */
     uint32_t cost_class;   /* enum pen_cost_class */
     bool textured;         /* rgb of its visibility follows the emission texture */
+    bool keeps_history;    /* goes on from the frame before of a request's session */
     uint32_t struct_size;  /* bytes of its parameter struct, at most PEN_TECHNIQUE_PARAM_BYTES */
     struct pen_param_table params;
     /* What is worth measuring when the choice of a method is left open: settings as "name=value"

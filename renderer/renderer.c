@@ -4,6 +4,7 @@
 #include "renderer/frame/output.h"
 #include "renderer/generate/generate.h"
 #include "renderer/gl/context.h"
+#include "renderer/passes/filter/history.h"
 #include "renderer/passes/map/shadow_cache.h"
 #include <math.h>
 #include <stdlib.h>
@@ -28,6 +29,7 @@ enum {
 
 #define MAX_RESIDENT 256
 #define DEFAULT_BUDGET (2ull << 30)
+#define SESSION_IDLE_MS 60e3
 #define EMISSION_BYTES (64u << 20) /* kept emission textures; they are cheap to make again */
 
 struct pen_render {
@@ -76,6 +78,8 @@ struct pen_renderer *pen_renderer_create(
     r->ctx.software = r->device.software;
     r->ctx.programs = gl_programs_create(config->programs);
     r->ctx.shadows = shadow_cache_create();
+    r->ctx.histories = history_store_create(
+        r->budget / 4, config->session_idle_ms > 0 ? config->session_idle_ms : SESSION_IDLE_MS);
     r->emissions = emission_cache_create();
     gl_samplers_init(&r->ctx.samplers);
     gl.CreateVertexArrays(1, &r->ctx.empty_array);
@@ -100,6 +104,7 @@ void pen_renderer_destroy(struct pen_renderer *r)
     for (uint32_t i = 0; i < r->scene_count; i++)
         scene_destroy(r->scenes[i]);
     shadow_cache_destroy(r->ctx.shadows);
+    history_store_destroy(r->ctx.histories);
     emission_cache_destroy(r->emissions);
     gl_samplers_finish(&r->ctx.samplers);
     gl_programs_destroy(r->ctx.programs);
@@ -132,7 +137,8 @@ static uint64_t scene_bytes(const struct pen_renderer *r)
 
 static uint64_t cached_bytes(const struct pen_renderer *r)
 {
-    return scene_bytes(r) + shadow_cache_bytes(r->ctx.shadows) + emission_cache_bytes(r->emissions);
+    return scene_bytes(r) + shadow_cache_bytes(r->ctx.shadows) +
+           emission_cache_bytes(r->emissions) + history_store_bytes(r->ctx.histories);
 }
 
 uint64_t pen_renderer_gpu_bytes(const struct pen_renderer *r)
@@ -198,7 +204,7 @@ static bool is_any_busy(const struct pen_renderer *r)
 }
 
 /* Frees something that can be made again, the cheapest first: targets that nobody draws into, shadow
- * inputs, emission textures, scenes. False: all that is left is in use. */
+ * inputs, sessions, emission textures, scenes. False: all that is left is in use. */
 static bool evict(struct pen_renderer *r, uint64_t bytes, const struct scene *keep)
 {
     uint64_t before = shadow_cache_bytes(r->ctx.shadows), least = UINT64_MAX;
@@ -209,6 +215,10 @@ static bool evict(struct pen_renderer *r, uint64_t bytes, const struct scene *ke
         }
     shadow_cache_trim(r->ctx.shadows, before > bytes ? before - bytes : 0);
     if (shadow_cache_bytes(r->ctx.shadows) < before)
+        return true;
+    before = history_store_bytes(r->ctx.histories);
+    history_store_trim(r->ctx.histories, before > bytes ? before - bytes : 0);
+    if (history_store_bytes(r->ctx.histories) < before)
         return true;
     before = emission_cache_bytes(r->emissions);
     if (before && !is_any_busy(r)) {
@@ -315,6 +325,13 @@ static bool can_pose(struct pen_renderer *r, struct scene *scene, const struct p
     return true;
 }
 
+/* Frames of one session come one after the other. */
+static bool is_session_busy(const struct pen_renderer *r, const struct pen_request *request)
+{
+    return pen_request_is_stateful(request, pen_renderer_catalogue()) &&
+           history_is_busy(r->ctx.histories, request);
+}
+
 static struct pen_render *free_render(struct pen_renderer *r)
 {
     for (uint32_t i = 0; i < PEN_MAX_RENDERS; i++)
@@ -370,7 +387,7 @@ enum pen_admission pen_renderer_admit(struct pen_renderer *r, const struct pen_r
     struct scene *scene = find_scene(r, request->scene);
     bool alone = !is_any_busy(r);
     enum pen_admission admission = PEN_LATER;
-    if (!free_render(r) || (scene && !can_pose(r, scene, request)))
+    if (!free_render(r) || (scene && !can_pose(r, scene, request)) || is_session_busy(r, request))
         return PEN_LATER;
     r->admitting = blobs;
     /* Nothing is loaded in vain while others are there. */
@@ -412,7 +429,7 @@ struct pen_render *pen_render_begin(struct pen_renderer *r, const struct pen_req
     struct pen_render *render = free_render(r);
     if (!pen_request_check(request, pen_renderer_catalogue(), error))
         goto fail;
-    if (!scene || !render || !can_pose(r, scene, request)) {
+    if (!scene || !render || !can_pose(r, scene, request) || is_session_busy(r, request)) {
         pen_fail(error, PEN_INTERNAL, "",
             scene ? "Too much is in progress." : "The scene is not resident.");
         goto fail;
@@ -436,6 +453,8 @@ struct pen_render *pen_render_begin(struct pen_renderer *r, const struct pen_req
         .find_image = find_image,
         .owner = r};
     render->need = picture_bytes(r, request);
+    if (technique_registry[t]->info.keeps_history)
+        lane->job.history = history_open(r->ctx.histories, lane->ctx.lane, request);
     lane_begin(lane, frame, result);
     return render;
 fail:
@@ -485,6 +504,9 @@ bool pen_render_end(struct pen_render *render, struct pen_error *error)
     struct pen_error failure = lane->error;
     bool ok = lane->ok && !cancelled && failure.code != PEN_LOST;
     lane->busy = false;
+    history_close(r->ctx.histories, lane->job.history, ok);
+    history_store_trim(r->ctx.histories, UINT64_MAX);
+    lane->job.history = NULL;
     shadow_cache_end_frame(&lane->ctx);
     uint64_t since = lane->programs_since;
     for (uint32_t i = 0; i < PEN_MAX_RENDERS; i++) {

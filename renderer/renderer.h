@@ -11,6 +11,7 @@ struct pen_renderer;
 struct pen_renderer_config {
     struct pen_device_config device;
     uint64_t gpu_memory_bytes; /* budget for scenes, images, shadow inputs and targets; 0: 2 GiB */
+    double session_idle_ms;    /* how long a session is kept that nobody uses; 0: a minute */
     uint32_t programs;         /* most compiled programs kept between frames; 0: 256 */
 };
 

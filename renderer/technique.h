@@ -16,6 +16,8 @@
 
 struct passes;
 struct shadow_cache;
+struct history;
+struct history_store;
 
 /* A frame in progress gives way to others between two pieces of work (passes/draw/turn.h). */
 struct technique_turns {
@@ -38,10 +40,11 @@ struct technique_ctx {
     struct gl_programs *programs;
     struct gl_samplers samplers;
     struct gl_timer timer;
-    struct shadow_cache *shadows; /* inputs that are kept between requests */
-    struct passes *passes;        /* what passes keep for themselves */
-    bool software;                /* OpenGL runs on the CPU */
-    GLuint empty_array;           /* vertex array for passes that make their own vertices */
+    struct shadow_cache *shadows;    /* inputs that are kept between requests */
+    struct history_store *histories; /* of sequences of frames */
+    struct passes *passes;           /* what passes keep for themselves */
+    bool software;                   /* OpenGL runs on the CPU */
+    GLuint empty_array;              /* vertex array for passes that make their own vertices */
     /* Uniform buffers: UBO_VIEW, UBO_LIGHT and UBO_PARAMS. */
     GLuint view_block, light_block, param_block;
     GLuint counts;           /* STORAGE_COUNTS of the frame's method, or 0 */
@@ -92,6 +95,7 @@ struct technique_run {
     uint32_t frame;                    /* number of the jittered frame */
     uint32_t light_index;              /* of the request */
     struct technique_watch *watch;     /* see passes/draw/show.h; NULL: nobody asks */
+    struct history *history;           /* of the sequence that the request goes on with, or NULL */
     /* R32F, or 0: nobody asks. A method that estimates its error adds the square of the standard
      * error of vis.a here, by blending. */
     GLuint variance_framebuffer;

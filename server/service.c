@@ -58,7 +58,8 @@ static void on_picture(void *context, struct picture *picture)
     if (!memcmp(picture->result.completed.scene, s->canary_id, PEN_ID_BYTES))
         return;
     metrics_render(s->metrics, &picture->result);
-    result_cache_put(s->cache, picture);
+    if (!pen_request_is_stateful(&picture->result.completed, s->catalogue))
+        result_cache_put(s->cache, picture);
 }
 
 static void on_measured(void *context, const struct pen_result *result)

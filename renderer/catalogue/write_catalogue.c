@@ -90,9 +90,10 @@ int main(void)
         write_text(info->citation);
         printf(",\n    .artefacts = ");
         write_text(info->artefacts);
-        printf(",\n    .cost_class = %u, .textured = %d, .struct_size = %u, "
+        printf(",\n    .cost_class = %u, .textured = %d, .keeps_history = %d, .struct_size = %u, "
                ".params = {rows_%u, %u},\n    .candidates = ",
-            info->cost_class, info->textured, info->struct_size, i, info->params.count);
+            info->cost_class, info->textured, info->keeps_history, info->struct_size, i,
+            info->params.count);
         write_list(info->candidates);
         printf(", .candidates_need_gpu = %d};\n", info->candidates_need_gpu);
     }

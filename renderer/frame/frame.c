@@ -10,6 +10,7 @@
 #include "renderer/light/meter.h"
 #include "renderer/passes/draw/gbuffer.h"
 #include "renderer/passes/draw/screen.h"
+#include "renderer/passes/filter/history.h"
 #include "renderer/passes/map/bound.h"
 #include "renderer/passes/map/shadow_cache.h"
 #include <cglm/cglm.h>
@@ -194,6 +195,7 @@ static bool record_face(
         .frame = f->number,
         .light_index = light,
         .watch = is_watchable(f, light, number) ? &f->watch : NULL,
+        .history = f->sketching ? NULL : job->history,
         .variance_framebuffer =
             !f->sketching && frame_layers_want_error(job->request, job->technique)
                 ? job->targets->variance.framebuffer
@@ -521,7 +523,8 @@ bool frame_render(const struct frame_job *job, struct pen_frame *frame, struct p
     if (!view_resolve(&f.view, &r->camera, job->scene, r->width, r->height, error))
         return false;
     bool scenes_own = !r->lights_given;
-    f.light_count = lights_resolve(f.lights, r, job->scene, &f.view, result);
+    f.light_count =
+        lights_resolve(f.lights, r, job->scene, history_key_view(job->history, r, &f.view), result);
     choose_exposure(&f, scenes_own);
     uint32_t faces = 1;
     for (uint32_t i = 0; i < f.light_count; i++)

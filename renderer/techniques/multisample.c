@@ -66,7 +66,9 @@ static bool record(struct technique_run *run, struct pen_error *error)
 {
     const struct multisample *params = run->params;
     struct sample_point points[MAX_SAMPLES];
-    sample_sequence(run->face, params->samples, points);
+    sample_sequence(run->face, 0, params->samples, points);
+    if (params->samples == 1) /* a point light's shadow is expected */
+        points[0] = sample_point_at(run->face, 0, 0);
     uint64_t bytes = (uint64_t)params->samples * params->map_size * params->map_size * 4;
     bool keep = bytes <= run->ctx->shadow_budget;
     const struct gl_target *sum = pass_sum(run);

@@ -164,7 +164,7 @@ static void add_common(struct call *call)
         http_add_header(x, "Access-Control-Allow-Origin", "%s", origin);
         http_add_header(x, "Access-Control-Expose-Headers",
             "ETag, Server-Timing, Location, Retry-After, X-Request-Id, Content-Location, "
-            "X-Penumbra-Choice, X-Penumbra-Warning");
+            "X-Penumbra-Choice, X-Penumbra-History, X-Penumbra-Warning");
     }
 }
 

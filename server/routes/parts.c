@@ -249,7 +249,8 @@ static char *make_record(struct parts *p, bool is_last)
     char href[HREF_BYTES];
     snprintf(href, sizeof href, "/v1/results/%s", p->shown->tag);
     const struct pen_progress *progress = &p->shown->result.progress;
-    bool complete = is_last && progress->done >= progress->total;
+    bool stateful = pen_request_is_stateful(&p->shown->result.completed, s->catalogue);
+    bool complete = is_last && progress->done >= progress->total && !stateful;
     /* What got better goes to a shelf of its own and leaves finished pictures alone. */
     bool kept = complete ? picture_cost(p->shown) <= s->config->result_cache.bytes
                          : result_cache_put(s->part_cache, p->shown);

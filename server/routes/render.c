@@ -21,6 +21,7 @@ struct rendering {
     struct parts *parts;     /* when the answer gets better */
     enum accept_form form;
     bool holds_share, is_deferred;
+    bool is_stateful; /* see pen_request_is_stateful */
 };
 
 /* ---- what is asked ---- */
@@ -167,7 +168,10 @@ static enum step_end recall(struct call *call, struct pen_error *error)
     struct pen_device_info device;
     char tag[PEN_ID_HEX + 1];
     call->note.technique = pen_catalogue_find(s->catalogue, work->request.technique)->name;
-    if (wants_fresh(call) || !read_device(s, &device))
+    work->is_stateful = pen_request_is_stateful(&work->request, s->catalogue);
+    if (!work->is_stateful) /* the method does not look at it */
+        memset(work->request.delivery.session, 0, sizeof work->request.delivery.session);
+    if (wants_fresh(call) || work->is_stateful || !read_device(s, &device))
         return STEP_NEXT;
     picture_tag(&work->request, &device, tag);
     if (work->form != ACCEPT_RECORD && work->form != ACCEPT_EVENTS && call_knows(call, tag)) {
@@ -239,7 +243,8 @@ static enum step_end queue(struct call *call, struct pen_error *error)
         .is_gone = is_gone,
         .finish = finish};
     /* What may end early suits nobody else. */
-    bool shareable = !wants_fresh(call) && !pen_delivery_is_limited(&work->request.delivery);
+    bool shareable = !wants_fresh(call) && !work->is_stateful &&
+                     !pen_delivery_is_limited(&work->request.delivery);
     work->holds_share = true; /* before another thread can complete the call */
     if (!work->is_deferred)
         http_defer(call->exchange);
@@ -284,7 +289,10 @@ static void add_picture_headers(struct call *call, double total_ms)
     http_add_header(x, "Vary", "Accept");
     /* Keep it, but ask: a restart may change it. What had to end early comes out otherwise each time. */
     bool complete = result->progress.done >= result->progress.total;
-    http_add_header(x, "Cache-Control", complete ? "no-cache" : "no-store");
+    http_add_header(x, "Cache-Control", complete && !work->is_stateful ? "no-cache" : "no-store");
+    if (work->is_stateful)
+        http_add_header(x, "X-Penumbra-History", "frames=%u, share=%.4f", result->history_frames,
+            (double)result->history_share);
     add_warnings(call, work->picture);
 }
 
@@ -321,15 +329,19 @@ static enum step_end answer(struct call *call, struct pen_error *error)
         metrics_overhead(s->metrics, total_ms - note->render_ms - note->queue_ms);
     add_picture_headers(call, total_ms);
     if (work->form == ACCEPT_RECORD) {
-        bool kept = picture_cost(picture) <= s->config->result_cache.bytes;
+        bool kept = !work->is_stateful && picture_cost(picture) <= s->config->result_cache.bytes;
         struct pen_record_extra extra = {.request_id = x->request_id,
             .image_href = kept ? href : NULL,
-            .etag = picture->tag,
+            .etag = work->is_stateful ? NULL : picture->tag,
             .total_ms = total_ms,
             .from_cache = note->cached,
             .choice = *work->choice.why ? work->choice.why : NULL,
             .choice_met = work->choice.met};
         call_json(call, 200, pen_result_json(&picture->result, &extra, s->catalogue));
+        return STEP_OVER;
+    }
+    if (work->is_stateful) {
+        send_picture(call, picture);
         return STEP_OVER;
     }
     http_add_header(x, "Content-Location", "%s", href);

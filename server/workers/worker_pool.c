@@ -181,6 +181,10 @@ static bool dispatch(struct slot *slot, struct flight *flight, struct render *re
     message.job_data.measure = render->measure;
     message.job_data.client = render->payer;
     message.job_data.best_until_ns = render->best_until_ns;
+    struct pen_delivery *delivery = &message.job_data.request.delivery;
+    memcpy(delivery->session_owner, &render->payer, sizeof render->payer);
+    if (render->measure != MEASURE_PICTURE) /* what is compared stands for itself */
+        memset(delivery->session, 0, sizeof delivery->session);
     if (!pool->config.open_job(pool->config.context, &message.job_data, &fds, &outcome.error)) {
         channel_close_fds(&fds);
         worker_slot_finish(slot, flight, &outcome);

@@ -114,8 +114,9 @@ static void on_done(
     } else if (outcome.error.code == PEN_OK) {
         char tag[PEN_ID_HEX + 1];
         picture_tag(&flight->render->request, &result.device, tag);
-        /* One that had to end early is not what the request stands for. */
-        bool complete = result.progress.done >= result.progress.total;
+        /* One that had to end early, or rests on others, is not what the request stands for. */
+        bool complete = result.progress.done >= result.progress.total &&
+                        !flight->render->request.delivery.session[0];
         outcome.picture = fds->count == 1 ? picture_create(fds->fd[0], &result,
                                                 complete ? tag : NULL, &outcome.error)
                                           : NULL;

@@ -1,8 +1,13 @@
 """Pictures as tests see them: decoded PNG, and glTF files made of a few lines."""
+import os
 import struct
+import sys
 import zlib
 
 import harness
+
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "../unit"))
+import pose_files
 
 
 def read_png(data):
@@ -92,3 +97,19 @@ def mesh_scene(points, normals, indices, color=(1, 1, 1, 1), node=None, material
         document[key] = document.get(key, []) + value if isinstance(value, list) else value
     document["scenes"][0]["nodes"] = list(range(len(document["nodes"])))
     return harness.glb(document, vertex + normal + index)
+
+
+def sliding_box():
+    """A plate one metre above a floor that moves along x from -2 to 2 within 4 s."""
+    def corners(half, y):
+        return [[-half, y, -half], [-half, y, half], [half, y, half],
+                [-half, y, -half], [half, y, half], [half, y, -half]]
+    b = pose_files.Builder()
+    for half, y in ((6, 0), (0.6, 1)):
+        b.json["meshes"].append({"primitives": [
+            {"attributes": {"POSITION": b.floats("VEC3", corners(half, y))}, "material": 0}]})
+    b.json["materials"] = [{"doubleSided": True}]
+    b.node(True, mesh=0)
+    plate = b.node(True, mesh=1)
+    b.animate("slide", [(plate, "translation", [0, 4], [[-2, 0, 0], [2, 0, 0]], "LINEAR")])
+    return b.glb()

@@ -51,15 +51,14 @@ void sample_points(const struct light_face *face, uint32_t count, struct sample_
  * off, after 16, 64 and 256 points: edges as well as the Hammersley set, corners better. */
 #define SEQUENCE_SEED 353u
 
-void sample_sequence(const struct light_face *face, uint32_t count, struct sample_point *points)
+void sample_sequence(
+    const struct light_face *face, uint32_t first, uint32_t count, struct sample_point *points)
 {
     for (uint32_t i = 0; i < count; i++) {
         uint32_t x, y;
-        trace_sample_at(i, SEQUENCE_SEED, &x, &y);
+        trace_sample_at(first + i, SEQUENCE_SEED, &x, &y);
         points[i] = sample_point_at(face, (float)x * 0x1p-31f - 1, (float)y * 0x1p-31f - 1);
     }
-    if (count == 1) /* a point light's shadow is expected */
-        points[0] = sample_point_at(face, 0, 0);
 }
 
 struct sample_map sample_map_entry(

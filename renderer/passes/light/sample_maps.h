@@ -15,9 +15,10 @@ struct sample_point {
  * of Shirley and Chiu 1997, which keeps areas. */
 struct sample_point sample_point_at(const struct light_face *face, float u, float v);
 
-/* The first `count` points of a sequence over the face's emitter of which every beginning is well
- * spread: what is there after some of them is a picture, and more only add to them. */
-void sample_sequence(const struct light_face *face, uint32_t count, struct sample_point *points);
+/* Points [first, first + count) of a sequence over the face's emitter of which every beginning is
+ * well spread: what is there after some of them is a picture, and more only add to them. */
+void sample_sequence(
+    const struct light_face *face, uint32_t first, uint32_t count, struct sample_point *points);
 
 /* `count` points of the Hammersley set (radical inverse in base 2) over the face's emitter. */
 void sample_points(const struct light_face *face, uint32_t count, struct sample_point *points);

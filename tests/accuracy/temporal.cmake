@@ -1,0 +1,1 @@
+penumbra_accuracy_test(temporal)

@@ -138,6 +138,8 @@ int cli_save_parts(const struct cli_server *server, struct cli_call *call, const
     call->sink = sink;
     int status = cli_call(server, call, answer);
     fclose(sink);
+    if (!p.in_header && !strncmp(p.type, "application/", 12))
+        take(&p, p.count, false); /* a problem is the end, without a boundary behind it */
     if (p.failed)
         status = CLI_FAILED;
     else if (p.problem) {

@@ -197,6 +197,29 @@ class Turns(unittest.TestCase):
         for name in ("worker_restarts", "worker_hangs"):
             self.assertEqual(self.d.metric("penumbra_%s_total" % name), 0, name)
 
+    def test_what_would_be_late_is_refused_at_once(self):
+        request = lambda n, **more: dict(
+            SMALL, technique={"name": "multisample", "params": {"samples": 64}}, exposure_ev=n,
+            deadline_ms=3600000, **more)
+        first = self.d.render(self.scene, request(0), Accept="application/json").json()["renderer"]
+        self.assertIsNone(first["expected_ms"])
+        used = self.d.render(self.scene, request(1), Accept="application/json").json()["renderer"]
+        self.assertGreater(used["expected_ms"], 0)
+        with self.d.paused():
+            waiting = [self.later(request(2 + n)) for n in range(harness.IN_TURNS + 8)]
+            wait(lambda: self.d.metric("penumbra_queue_depth") == 8)
+            late = self.d.render(self.scene, dict(
+                request(20), deadline_ms=max(1, int(used["expected_ms"]))))
+            self.assertEqual(late.status, 503, late.body)
+            self.assertGreaterEqual(int(late.headers["Retry-After"]), 1)
+            self.assertEqual(late.json()["pointer"], "/deadline_ms")
+            waiting.append(self.later(request(21)))  # who can wait is let in
+        for thread, answers in waiting:
+            thread.join()
+            self.assertEqual(answers[0].status, 200, answers[0].body)
+        self.assertEqual(self.d.metric("penumbra_renders_refused_late_total"), 1)
+        self.check_nothing_happened()
+
     def descriptors(self):
         return len(os.listdir("/proc/%d/fd" % self.d.worker()))
 

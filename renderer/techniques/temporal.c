@@ -27,7 +27,7 @@ static const struct pen_param rows[] = {
     PARAM(struct temporal, weighting, .choices = weighting_names, .specialise = 1,
         .help = "Mean over the light's area, or weighted by each point's irradiance."),
     BIAS_ROW(struct temporal),
-    PARAM(struct temporal, most, .def = 64, .min = 1, .max = 65536, .unit = "samples",
+    PARAM(struct temporal, most, .def = 20, .min = 1, .max = 65536, .unit = "samples",
         .help = "How much the past counts at most while the camera moves; older frames fade. With "
                 "a camera and a scene that stand still, everything counts."),
     PARAM(struct temporal, most_moving, .def = 12, .min = 1, .max = 65536, .unit = "samples",

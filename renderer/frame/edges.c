@@ -5,6 +5,7 @@
 #include "renderer/passes/draw/screen.h"
 #include "renderer/passes/draw/tiles.h"
 #include "renderer/passes/draw/turn.h"
+#include <stdio.h>
 
 #define SHARED_ROWS "renderer/shaders/screen/open_tiles.def"
 #include "renderer/shared/rows_c.h"
@@ -14,8 +15,7 @@
 bool frame_edges_are_smooth(const struct frame_job *job)
 {
     const struct pen_request *r = job->request;
-    return r->edges == PEN_EDGES_SMOOTH && r->antialias == 1 && !job->scene->has_blend &&
-           frame_needs(r, PEN_SOURCE_BEAUTY);
+    return r->edges == PEN_EDGES_SMOOTH && r->antialias == 1 && frame_needs(r, PEN_SOURCE_BEAUTY);
 }
 
 /* What shows no edge stays as it is. Software rasterisers run all of a shader for every pixel, so
@@ -29,15 +29,18 @@ static bool find_tiles(
     uint32_t height = (job->request->height + OPEN_TILE - 1) / OPEN_TILE;
     gl_target_fit(target, GL_RG8, width, height, 0, 1);
     struct open_tiles_block block = {.tile = {OPEN_TILE}};
-    struct pass_texture depth = {
-        UNIT_DEPTH, job->targets->gbuffer.depth.texture.name, GL_SAMPLE_NEAREST};
+    bool layered = frame_is_layered(job);
+    struct pass_texture depths[] = {
+        {UNIT_DEPTH, job->targets->gbuffer.depth.texture.name, GL_SAMPLE_NEAREST},
+        {UNIT_BEFORE, job->targets->front_depth.texture.name, GL_SAMPLE_NEAREST}};
     *tiles = &target->texture;
     return pass_fill(job->ctx,
         &(struct pass_fill){.name = "edge tiles",
             .fragment = "edge_tiles.frag",
             .stage = PEN_STAGE_SHADE,
-            .textures = &depth,
-            .texture_count = 1,
+            .defines = layered ? "#define LAYERED\n" : NULL,
+            .textures = depths,
+            .texture_count = layered ? 2 : 1,
             .framebuffer = target->framebuffer,
             .width = width,
             .height = height,
@@ -55,14 +58,17 @@ static bool blend(const struct frame_job *job, const struct gl_texture *picture,
         {UNIT_DEPTH, t->gbuffer.depth.texture.name, GL_SAMPLE_NEAREST},
         {UNIT_NORMAL, t->gbuffer.normal.texture.name, GL_SAMPLE_NEAREST},
         {UNIT_PLACES, t->places.texture.name, GL_SAMPLE_NEAREST},
-        {UNIT_SOURCE, picture->name, GL_SAMPLE_NEAREST}};
+        {UNIT_SOURCE, picture->name, GL_SAMPLE_NEAREST},
+        {UNIT_BEFORE, t->front_depth.texture.name, GL_SAMPLE_NEAREST},
+        {UNIT_FRONT_NORMAL, t->front_normal.texture.name, GL_SAMPLE_NEAREST},
+        {UNIT_FRONT_PLACES, t->front_places.texture.name, GL_SAMPLE_NEAREST}};
     return pass_fill(job->ctx,
         &(struct pass_fill){.name = "edges",
             .fragment = "edges.frag",
             .defines = defines,
             .stage = PEN_STAGE_SHADE,
             .textures = textures,
-            .texture_count = sizeof textures / sizeof *textures,
+            .texture_count = frame_is_layered(job) ? 7 : 4,
             .framebuffer = t->color.framebuffer,
             .width = job->request->width,
             .height = job->request->height,
@@ -94,7 +100,12 @@ bool frame_edges_blend(const struct frame_job *job, const struct view *view, boo
 {
     struct frame_targets *t = job->targets;
     const struct pen_request *r = job->request;
-    const char *defines = resolved ? "#define RESOLVED\n" : raw ? "#define RAW\n" : NULL;
+    bool layered = frame_is_layered(job);
+    char defines[64];
+    snprintf(defines, sizeof defines, "%s%s", layered ? "#define LAYERED\n" : "",
+        resolved ? "#define RESOLVED\n"
+        : raw    ? "#define RAW\n"
+                 : "");
     uint32_t most = BAND_PIXELS / r->width;
     const struct gl_texture *tiles;
     if (!fill(job, resolved, raw, error) || !find_tiles(job, &tiles, error))
@@ -103,8 +114,10 @@ bool frame_edges_blend(const struct frame_job *job, const struct view *view, boo
     for (uint32_t first = 0; ok && first < r->height; first += most) {
         uint32_t rows = r->height - first < most ? r->height - first : most;
         struct edges_block block;
-        ok = pass_places(job->ctx, job->scene, view, r->ground.on, first, rows, &t->places, &block,
-                 error) &&
+        ok = pass_places(job->ctx, job->scene, view, layered ? PLACES_SOLID : PLACES_ALL,
+                 r->ground.on, first, rows, &t->places, &block, error) &&
+             (!layered || pass_places(job->ctx, job->scene, view, PLACES_BLENDED, false, first,
+                              rows, &t->front_places, &block, error)) &&
              blend(job, resolved ? &t->stairs.texture : &t->beauty.texture, defines, &block, tiles,
                  error);
     }

@@ -2,8 +2,7 @@
 #pragma once
 #include "renderer/frame/job.h"
 
-/* Of the beauty layer; all others say what is at the centre of a pixel. Not of scenes with blended
- * surfaces: a pixel that shows none of them says nothing of its neighbours. */
+/* Of the beauty layer; all others say what is at the centre of a pixel. */
 bool frame_edges_are_smooth(const struct frame_job *job);
 /* What the file holds of the beauty layer, into targets->color. `resolved`:
  * targets->stairs is the picture, else the sum in targets->beauty; `raw`: the file is of radiance. */

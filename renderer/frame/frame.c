@@ -1,5 +1,6 @@
 #include "renderer/frame/frame.h"
 #include "protocol/container.h"
+#include "renderer/frame/blended.h"
 #include "renderer/frame/edges.h"
 #include "renderer/frame/layers.h"
 #include "renderer/frame/needs.h"
@@ -22,8 +23,6 @@
 #include "renderer/shared/rows_c.h"
 #define SHARED_ROWS "renderer/shaders/frame/shade.def"
 #include "renderer/shared/rows_c.h"
-#define SHARED_ROWS "renderer/shaders/frame/average.def"
-#include "renderer/shared/rows_c.h"
 
 #define SKETCH_SAMPLES 16
 
@@ -35,12 +34,15 @@ struct frame {
     uint32_t light_count;
     struct pen_result *result;
     uint64_t triangles;
-    bool classified; /* at least one light of one frame */
-    bool coarse;     /* said of one light */
-    uint32_t number; /* of the jittered frame */
-    bool sky_known;  /* of this jittered frame */
-    bool sketching;  /* few samples of each light are taken, so that there is something of all */
-    bool sketched;   /* that is done */
+    bool classified;               /* at least one light of one frame */
+    bool coarse;                   /* said of one light */
+    uint32_t number;               /* of the jittered frame */
+    const struct gbuffer *gbuffer; /* what is lit */
+    bool layer;                    /* it is a blended one */
+    bool data;                     /* data layers are about it */
+    bool sky_known;                /* of it */
+    bool sketching; /* few samples of each light are taken, so that there is something of all */
+    bool sketched;  /* that is done */
     struct frame_work work;
     struct frame_progress progress;
     struct technique_watch watch;
@@ -52,9 +54,11 @@ static void fit_targets(struct frame *f)
     const struct pen_request *r = f->job->request;
     frame_output_fit(t, r);
     gl_target_fit(&t->vis, GL_RGBA16F, r->width, r->height, f->light_count ? f->light_count : 1, 1);
-    if (frame_output_is_direct(r) && frame_edges_are_smooth(f->job))
+    if (frame_is_layered(f->job))
+        frame_blended_fit(f->job);
+    if (frame_output_is_direct(f->job) && frame_edges_are_smooth(f->job))
         gl_target_fit(&t->stairs, GL_RGBA8, r->width, r->height, 0, 1);
-    if (!frame_output_is_direct(r) && frame_needs(r, PEN_SOURCE_BEAUTY))
+    if (!frame_output_is_direct(f->job) && frame_needs(r, PEN_SOURCE_BEAUTY))
         frame_fit_sum(&t->beauty, GL_RGBA32F, r);
     if (frame_needs(r, PEN_SOURCE_VISIBILITY))
         frame_fit_sum(&t->visibility, GL_RGBA32F, r);
@@ -90,20 +94,6 @@ static void upload_view(struct frame *f, uint32_t number)
     b.display[3] = 1 / (float)r->antialias;
     gl.NamedBufferData(f->job->ctx->view_block, sizeof b, &b, GL_STREAM_DRAW);
     gl.BindBufferBase(GL_UNIFORM_BUFFER, UBO_VIEW, f->job->ctx->view_block);
-}
-
-/* Point `index` of the Halton sequence in bases 2 and 3, centred on 0. */
-static void jitter(uint32_t index, float *x, float *y)
-{
-    float at[2] = {0, 0};
-    for (uint32_t k = 0; k < 2; k++) {
-        float scale = 1;
-        for (uint32_t i = index + 1; i; i /= k + 2) {
-            scale /= (float)(k + 2);
-            at[k] += scale * (float)(i % (k + 2));
-        }
-    }
-    *x = at[0] - 0.5f, *y = at[1] - 0.5f;
 }
 
 static bool resolve_emissions(struct frame *f, struct pen_error *error)
@@ -160,12 +150,18 @@ static bool bound_faces(struct frame *f, struct technique_run *run, struct pen_e
     return true;
 }
 
+/* What is lit is the picture's, and last of it. */
+static bool is_picture(const struct frame *f)
+{
+    return !f->layer && f->data != frame_is_layered(f->job);
+}
+
 /* Of the first jittered frame, when there is something of all lights. The next ones are mixed in
  * whole. */
 static bool is_watchable(const struct frame *f, uint32_t light, uint32_t face)
 {
     bool last = light + 1 == f->light_count && face + 1 == f->lights[light].face_count;
-    return f->number == 0 && (last || f->sketched) && !f->sketching;
+    return is_picture(f) && f->number == 0 && (last || f->sketched) && !f->sketching;
 }
 
 static bool record_face(
@@ -179,7 +175,7 @@ static bool record_face(
     struct technique_run run = {.ctx = ctx,
         .scene = job->scene,
         .view = &f->view,
-        .gbuffer = &job->targets->gbuffer,
+        .gbuffer = f->gbuffer,
         .light = &f->lights[light],
         .face = face,
         .request = job->request,
@@ -195,9 +191,9 @@ static bool record_face(
         .frame = f->number,
         .light_index = light,
         .watch = is_watchable(f, light, number) ? &f->watch : NULL,
-        .history = f->sketching ? NULL : job->history,
+        .history = f->sketching || !is_picture(f) ? NULL : job->history,
         .variance_framebuffer =
-            !f->sketching && frame_layers_want_error(job->request, job->technique)
+            f->data && !f->sketching && frame_layers_want_error(job->request, job->technique)
                 ? job->targets->variance.framebuffer
                 : 0};
     if (!job->technique->record(&run, error))
@@ -210,17 +206,19 @@ static bool record_face(
     f->classified |= run.tiles != NULL;
     const struct gl_texture *tiles = run.tiles;
     return bound_faces(f, &run, error) &&
-           (!frame_layers_want_classes(job->request) ||
+           (!f->data || !frame_layers_want_classes(job->request) ||
                frame_layers_add_classes(job, tiles, number == 0, error));
 }
 
-static bool record_light(struct frame *f, uint32_t light, struct pen_error *error)
+/* uncounted: lights of which the method has not counted its full work. */
+static bool record_light(
+    struct frame *f, uint32_t light, uint32_t *uncounted, struct pen_error *error)
 {
     bool counted = false;
     for (uint32_t k = 0; k < f->lights[light].face_count; k++)
         if (!f->progress.stopped && !record_face(f, light, k, &counted, error))
             return false;
-    f->work.lights[f->number] += !counted;
+    *uncounted += !counted;
     return true;
 }
 
@@ -287,12 +285,14 @@ static bool know_sky(struct frame *f, struct pen_error *error)
     if (f->sky_known || !r->sky.on || !frame_needs(r, PEN_SOURCE_BEAUTY))
         return true;
     f->sky_known = true;
-    return sky_occlusion(f->job, error);
+    const struct gl_texture *around = f->layer ? &f->job->targets->gbuffer.depth.texture : NULL;
+    return sky_occlusion(f->job, f->gbuffer, around, error);
 }
 
 static bool record_visibility(struct frame *f, struct pen_error *error)
 {
     const struct frame_job *job = f->job;
+    uint32_t uncounted = 0, receivers = 0;
     /* What is left to do after the samples is to be small. */
     if (frame_progress_is_limited(&f->progress) && !know_sky(f, error))
         return false;
@@ -303,12 +303,17 @@ static bool record_visibility(struct frame *f, struct pen_error *error)
     upload_params(f);
     for (uint32_t i = 0; i < f->light_count && !f->progress.stopped; i++) {
         aim_light(f, i);
-        if (!record_light(f, i, error))
+        if (!record_light(f, i, &uncounted, error))
             return false;
     }
     f->sketched = false;
-    return !f->work.lights[f->number] ||
-           frame_layers_count_receivers(job, f->number, &f->work, error);
+    if (frame_is_layered(job)) {
+        bool ok = !uncounted || frame_layers_count_now(job, f->gbuffer, &receivers, error);
+        f->result->full_work_pixels += uncounted * receivers;
+        return ok;
+    }
+    f->work.lights[f->number] = uncounted;
+    return !uncounted || frame_layers_count_receivers(job, f->number, &f->work, error);
 }
 
 static void scale3(float out[4], const float v[3], float factor, float w)
@@ -339,21 +344,22 @@ static bool shade(struct frame *f, struct pen_error *error)
 {
     const struct frame_job *job = f->job;
     const struct frame_targets *t = job->targets;
-    bool direct = frame_output_is_direct(job->request),
-         emission = t->gbuffer.emission.texture.name != 0;
-    const struct gl_target *target = !direct                       ? &t->beauty
+    const struct gbuffer *g = f->gbuffer;
+    bool direct = frame_output_is_direct(job), layered = frame_is_layered(job),
+         emission = g->emission.texture.name != 0;
+    const struct gl_target *target = layered                       ? &t->layers
+                                     : !direct                     ? &t->beauty
                                      : frame_edges_are_smooth(job) ? &t->stairs
                                                                    : &t->color;
     struct shade_block block;
     make_shade_block(f, &block);
-    struct pass_texture textures[] = {
-        {UNIT_DEPTH, t->gbuffer.depth.texture.name, GL_SAMPLE_NEAREST},
-        {UNIT_NORMAL, t->gbuffer.normal.texture.name, GL_SAMPLE_NEAREST},
-        {UNIT_ALBEDO, t->gbuffer.albedo.texture.name, GL_SAMPLE_NEAREST},
-        {UNIT_SURFACE, t->gbuffer.surface.texture.name, GL_SAMPLE_NEAREST},
+    struct pass_texture textures[] = {{UNIT_DEPTH, g->depth.texture.name, GL_SAMPLE_NEAREST},
+        {UNIT_NORMAL, g->normal.texture.name, GL_SAMPLE_NEAREST},
+        {UNIT_ALBEDO, g->albedo.texture.name, GL_SAMPLE_NEAREST},
+        {UNIT_SURFACE, g->surface.texture.name, GL_SAMPLE_NEAREST},
         {UNIT_SOURCE, t->vis.texture.name, GL_SAMPLE_NEAREST},
         {UNIT_SKY_OPEN, t->sky_open[1].texture.name, GL_SAMPLE_NEAREST},
-        {UNIT_EMITTED, t->gbuffer.emission.texture.name, GL_SAMPLE_NEAREST}};
+        {UNIT_EMITTED, g->emission.texture.name, GL_SAMPLE_NEAREST}};
     bool rect = false, round = false, punctual = false;
     for (uint32_t i = 0; i < f->light_count; i++) {
         uint32_t type = f->lights[i].source->type;
@@ -361,10 +367,11 @@ static bool shade(struct frame *f, struct pen_error *error)
         round |= type == PEN_LIGHT_DISK || type == PEN_LIGHT_SPHERE;
         punctual |= type >= PEN_LIGHT_SUN;
     }
-    char defines[288];
-    snprintf(defines, sizeof defines, "#define LIGHTS %u\n%s%s%s%s%s%s%s%s%s", f->light_count,
+    char defines[320];
+    snprintf(defines, sizeof defines, "#define LIGHTS %u\n%s%s%s%s%s%s%s%s%s%s%s", f->light_count,
+        layered ? "#define LAYERED\n" : "", f->layer ? "#define LAYER\n" : "",
         pen_request_is_transparent(job->request) ? "#define TRANSPARENT\n" : "",
-        job->request->ground.on == PEN_FLAG_WORD ? "#define CATCHER\n" : "",
+        job->request->ground.on == PEN_FLAG_WORD && !f->layer ? "#define CATCHER\n" : "",
         job->request->sky.on ? "#define SKY\n" : "",
         job->scene->has_gloss ? "#define GLOSSY\n" : "", direct ? "#define RESOLVE\n" : "",
         emission ? "#define EMIT\n" : "", rect ? "#define HAS_RECT\n" : "",
@@ -379,46 +386,71 @@ static bool shade(struct frame *f, struct pen_error *error)
             .framebuffer = target->framebuffer,
             .width = job->request->width,
             .height = job->request->height,
-            .add = !direct,
+            .add = !direct && !layered,
+            .under = layered,
             .extra = &block,
             .extra_bytes = sizeof block},
         error);
 }
 
-static bool add_visibility(struct frame *f, struct pen_error *error)
+/* Light and shadow of what is in a G-buffer. */
+static bool light_up(struct frame *f, bool beauty, struct pen_error *error)
 {
-    struct average_block block = {.count = {(int32_t)f->light_count}};
-    const struct frame_targets *t = f->job->targets;
-    struct pass_texture texture = {UNIT_SOURCE, t->vis.texture.name, GL_SAMPLE_NEAREST};
-    return pass_fill(f->job->ctx,
-        &(struct pass_fill){.name = "average",
-            .fragment = "average.frag",
-            .stage = PEN_STAGE_SHADE,
-            .textures = &texture,
-            .texture_count = 1,
-            .framebuffer = t->visibility.framebuffer,
-            .width = f->job->request->width,
-            .height = f->job->request->height,
-            .add = true,
-            .extra = &block,
-            .extra_bytes = sizeof block},
-        error);
+    return (!frame_needs_shadows(f->job->request) || record_visibility(f, error)) &&
+           (!beauty || (know_sky(f, error) && shade(f, error)));
+}
+
+static bool draw(
+    struct frame *f, struct gbuffer_pass pass, struct gbuffer *g, struct pen_error *error)
+{
+    const struct frame_job *job = f->job;
+    f->gbuffer = g;
+    f->sky_known = false;
+    f->layer = pass.kind == GBUFFER_LAYER;
+    pass.ground = !f->layer && job->request->ground.on;
+    return pass_gbuffer(job->ctx, job->scene, &f->view, &pass, g, &f->triangles, error);
+}
+
+static bool render_layers(struct frame *f, struct pen_error *error)
+{
+    const struct frame_job *job = f->job;
+    struct gbuffer *solid = &job->targets->gbuffer, *layer = &job->targets->layer;
+    uint32_t pixels = 1;
+    f->data = false;
+    frame_blended_begin(job);
+    if (!draw(f, (struct gbuffer_pass){.kind = GBUFFER_SOLID}, solid, error))
+        return false;
+    for (uint32_t i = 0; i < BLENDED_LAYERS && pixels; i++) {
+        if (!draw(f, frame_blended_pass(job, i), layer, error) ||
+            !frame_layers_count_now(job, layer, &pixels, error) ||
+            (pixels && !light_up(f, true, error)))
+            return false;
+        frame_blended_next(job, i);
+    }
+    f->gbuffer = solid;
+    f->sky_known = false;
+    f->layer = false;
+    return light_up(f, true, error) && frame_blended_end(job, error);
 }
 
 /* The pass list. */
 static bool render_jittered(struct frame *f, uint32_t number, struct pen_error *error)
 {
-    const struct pen_request *r = f->job->request;
-    bool beauty = frame_needs(r, PEN_SOURCE_BEAUTY),
-         visibility = frame_needs(r, PEN_SOURCE_VISIBILITY);
-    f->number = f->job->ctx->turns.frame = number;
-    f->sky_known = false;
+    const struct frame_job *job = f->job;
+    const struct pen_request *r = job->request;
+    bool layered = frame_is_layered(job), beauty = frame_needs(r, PEN_SOURCE_BEAUTY);
+    struct gbuffer *g = layered ? &job->targets->layer : &job->targets->gbuffer;
+    f->number = job->ctx->turns.frame = number;
     upload_view(f, number);
-    return pass_gbuffer(f->job->ctx, f->job->scene, &f->view, r->ground.on,
-               &f->job->targets->gbuffer, &f->triangles, error) &&
-           (!frame_needs_shadows(r) || record_visibility(f, error)) &&
-           (!beauty || (know_sky(f, error) && shade(f, error))) &&
-           (!visibility || add_visibility(f, error));
+    if (layered && !render_layers(f, error))
+        return false;
+    if (layered && r->output.layer != PEN_LAYER_ALL)
+        return true;
+    f->data = true;
+    return draw(f, (struct gbuffer_pass){.kind = GBUFFER_HASHED}, g, error) &&
+           light_up(f, beauty && !layered, error) &&
+           (!frame_needs(r, PEN_SOURCE_VISIBILITY) ||
+               frame_layers_add_visibility(f->job, f->light_count, error));
 }
 
 static bool show_frame(struct frame *f, uint32_t frames, struct pen_error *error)
@@ -444,9 +476,16 @@ static bool show_estimate(struct frame *f, struct pen_error *error)
     static const float zero[4] = {0};
     bool beauty = frame_needs(r, PEN_SOURCE_BEAUTY),
          visibility = frame_needs(r, PEN_SOURCE_VISIBILITY);
+    bool layered = frame_is_layered(f->job);
+    if (layered)
+        frame_blended_keep(f->job);
     bool ok = (!beauty || (know_sky(f, error) && shade(f, error))) &&
-              (!visibility || add_visibility(f, error)) && show_frame(f, 1, error);
-    if (beauty && !frame_output_is_direct(r))
+              (!layered || frame_blended_end(f->job, error)) &&
+              (!visibility || frame_layers_add_visibility(f->job, f->light_count, error)) &&
+              show_frame(f, 1, error);
+    if (layered)
+        frame_blended_restore(f->job);
+    if (beauty && !frame_output_is_direct(f->job))
         gl_target_clear(&t->beauty, zero);
     if (visibility)
         gl_target_clear(&t->visibility, zero);
@@ -497,20 +536,6 @@ static bool look_up(struct frame *f, bool *enough, struct pen_error *error)
     return ok;
 }
 
-/* What faces the lights squarely comes out just below white, with the sky's share on top. The key
- * light is made to measure: its level is 1. */
-static void choose_exposure(struct frame *f, bool scenes_own)
-{
-    struct pen_request *r = f->job->request;
-    const struct scene *scene = f->job->scene;
-    bool key_light = scenes_own && !scene->blob.light_count;
-    float level = key_light ? 1 : light_meter(f->lights, f->light_count, scenes_own, scene);
-    if (r->exposure_ev == PEN_AUTO)
-        r->exposure_ev = glm_clamp(log2f(0.72f / level), -24, 24);
-    if (r->sky_level == PEN_AUTO)
-        r->sky_level = fminf(level, 1e6f);
-}
-
 bool frame_render(const struct frame_job *job, struct pen_frame *frame, struct pen_result *result,
     struct pen_error *error)
 {
@@ -525,7 +550,7 @@ bool frame_render(const struct frame_job *job, struct pen_frame *frame, struct p
     bool scenes_own = !r->lights_given;
     f.light_count =
         lights_resolve(f.lights, r, job->scene, history_key_view(job->history, r, &f.view), result);
-    choose_exposure(&f, scenes_own);
+    light_choose_exposure(r, f.lights, f.light_count, scenes_own, job->scene);
     uint32_t faces = 1;
     for (uint32_t i = 0; i < f.light_count; i++)
         faces += f.lights[i].face_count;
@@ -538,11 +563,8 @@ bool frame_render(const struct frame_job *job, struct pen_frame *frame, struct p
     frame_progress_begin(&f.progress, job, f.light_count);
     bool enough = false;
     for (uint32_t i = 0; i < r->antialias && !enough; i++) {
-        float x = 0, y = 0;
-        if (r->antialias > 1) {
-            jitter(i, &x, &y);
-            view_jitter(&f.view, x, y);
-        }
+        if (r->antialias > 1)
+            view_jitter(&f.view, i);
         if (!render_jittered(&f, i, error) || !look_up(&f, &enough, error))
             goto done;
         if (f.progress.late) {

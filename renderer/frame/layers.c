@@ -1,9 +1,12 @@
 #include "renderer/frame/layers.h"
+#include "renderer/frame/blended.h"
 #include "renderer/frame/needs.h"
 #include "renderer/passes/draw/screen.h"
 #include "renderer/passes/draw/turn.h"
 #include "renderer/passes/map/classify.h"
 
+#define SHARED_ROWS "renderer/shaders/frame/average.def"
+#include "renderer/shared/rows_c.h"
 #define SHARED_ROWS "renderer/shaders/frame/classes.def"
 #include "renderer/shared/rows_c.h"
 
@@ -32,11 +35,32 @@ void frame_layers_begin(const struct frame_job *job, struct pen_result *result)
         pen_result_warn(result, "%s does not estimate its error: the layer is 0.", title);
 }
 
+bool frame_layers_add_visibility(
+    const struct frame_job *job, uint32_t light_count, struct pen_error *error)
+{
+    struct average_block block = {.count = {(int32_t)light_count}};
+    const struct frame_targets *t = job->targets;
+    struct pass_texture texture = {UNIT_SOURCE, t->vis.texture.name, GL_SAMPLE_NEAREST};
+    return pass_fill(job->ctx,
+        &(struct pass_fill){.name = "average",
+            .fragment = "average.frag",
+            .stage = PEN_STAGE_SHADE,
+            .textures = &texture,
+            .texture_count = 1,
+            .framebuffer = t->visibility.framebuffer,
+            .width = job->request->width,
+            .height = job->request->height,
+            .add = true,
+            .extra = &block,
+            .extra_bytes = sizeof block},
+        error);
+}
+
 bool frame_layers_add_classes(const struct frame_job *job, const struct gl_texture *tiles,
     bool first, struct pen_error *error)
 {
     struct pass_texture textures[] = {
-        {UNIT_DEPTH, job->targets->gbuffer.depth.texture.name, GL_SAMPLE_NEAREST},
+        {UNIT_DEPTH, frame_data_gbuffer(job)->depth.texture.name, GL_SAMPLE_NEAREST},
         {UNIT_TILES, tiles ? tiles->name : 0, GL_SAMPLE_NEAREST}};
     struct classes_block block = {.tile = {CLASSIFY_TILE, first ? 1 : 0}};
     return pass_fill(job->ctx,
@@ -55,8 +79,8 @@ bool frame_layers_add_classes(const struct frame_job *job, const struct gl_textu
         error);
 }
 
-bool frame_layers_count_receivers(
-    const struct frame_job *job, uint32_t number, struct frame_work *work, struct pen_error *error)
+static bool count(const struct frame_job *job, const struct gbuffer *gbuffer, GLuint *query,
+    struct pen_error *error)
 {
     struct gl_program_desc desc = {.vertex = "screen.vert",
         .fragment = "constant.frag",
@@ -65,8 +89,8 @@ bool frame_layers_count_receivers(
     if (!program)
         return false;
     gl_timer_begin(&job->ctx->timer, PEN_STAGE_GBUFFER, "count receivers");
-    gl.CreateQueries(GL_SAMPLES_PASSED, 1, &work->queries[number]);
-    gl.BindFramebuffer(GL_FRAMEBUFFER, job->targets->gbuffer.framebuffer);
+    gl.CreateQueries(GL_SAMPLES_PASSED, 1, query);
+    gl.BindFramebuffer(GL_FRAMEBUFFER, gbuffer->framebuffer);
     gl.Viewport(0, 0, (GLsizei)job->request->width, (GLsizei)job->request->height);
     gl.UseProgram(program);
     gl.BindVertexArray(job->ctx->empty_array);
@@ -75,7 +99,7 @@ bool frame_layers_count_receivers(
     gl.DepthFunc(GL_LESS);
     gl.DepthMask(GL_FALSE);
     gl.ColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_FALSE);
-    gl.BeginQuery(GL_SAMPLES_PASSED, work->queries[number]);
+    gl.BeginQuery(GL_SAMPLES_PASSED, *query);
     gl.DrawArrays(GL_TRIANGLES, 0, 3);
     gl.EndQuery(GL_SAMPLES_PASSED);
     gl.ColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
@@ -83,6 +107,25 @@ bool frame_layers_count_receivers(
     gl.Disable(GL_DEPTH_TEST);
     gl_timer_end(&job->ctx->timer);
     return pass_turn(job->ctx, error);
+}
+
+bool frame_layers_count_receivers(
+    const struct frame_job *job, uint32_t number, struct frame_work *work, struct pen_error *error)
+{
+    return count(job, &job->targets->gbuffer, &work->queries[number], error);
+}
+
+bool frame_layers_count_now(const struct frame_job *job, const struct gbuffer *gbuffer,
+    uint32_t *receivers, struct pen_error *error)
+{
+    GLuint query = 0;
+    GLuint64 found = 0;
+    bool ok = count(job, gbuffer, &query, error);
+    if (ok)
+        gl.GetQueryObjectui64v(query, GL_QUERY_RESULT, &found);
+    gl.DeleteQueries(1, &query);
+    *receivers = (uint32_t)found;
+    return ok;
 }
 
 void frame_layers_end(const struct frame_job *job, const struct frame_work *work, bool classified,

@@ -10,6 +10,9 @@ bool frame_layers_want_error(const struct pen_request *request, const struct tec
 /* Makes what the request wants fit, and clears it. Warns of an error layer that will be 0. */
 void frame_layers_begin(const struct frame_job *job, struct pen_result *result);
 
+/* Adds the mean over the lights of what is in targets->vis. */
+bool frame_layers_add_visibility(
+    const struct frame_job *job, uint32_t light_count, struct pen_error *error);
 /* Adds one face of one light of one jittered frame. `tiles`: of pass_classify, or NULL when the
  * method worked on every pixel. `first`: of the light's faces; the background counts with it. */
 bool frame_layers_add_classes(const struct frame_job *job, const struct gl_texture *tiles,
@@ -23,6 +26,9 @@ struct frame_work {
 /* Starts counting the receivers in the G-buffer of jittered frame `number`. */
 bool frame_layers_count_receivers(
     const struct frame_job *job, uint32_t number, struct frame_work *work, struct pen_error *error);
+/* Those in a G-buffer, at once. */
+bool frame_layers_count_now(const struct frame_job *job, const struct gbuffer *gbuffer,
+    uint32_t *receivers, struct pen_error *error);
 
 /* After the last frame: adds to result->full_work_pixels, and warns of a layer of classes for which
  * nothing was classified. */

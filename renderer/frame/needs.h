@@ -1,8 +1,22 @@
 /* What a request needs of a frame. */
 #pragma once
-#include "protocol/request.h"
+#include "renderer/frame/job.h"
 
 /* A layer of the output is made of that. */
-bool frame_needs(const struct pen_request *request, enum pen_layer_source source);
+static inline bool frame_needs(const struct pen_request *r, enum pen_layer_source source)
+{
+    return r->output.layer == PEN_LAYER_ALL || pen_layers[r->output.layer].source == source;
+}
+
 /* True when the method has to run at all. */
-bool frame_needs_shadows(const struct pen_request *request);
+static inline bool frame_needs_shadows(const struct pen_request *r)
+{
+    return r->output.layer == PEN_LAYER_ALL ||
+           pen_layers[r->output.layer].source != PEN_SOURCE_GBUFFER;
+}
+
+/* The picture is made of layers: see blended.h. */
+static inline bool frame_is_layered(const struct frame_job *job)
+{
+    return job->scene->has_blend && frame_needs(job->request, PEN_SOURCE_BEAUTY);
+}

@@ -1,4 +1,5 @@
 #include "renderer/frame/output.h"
+#include "renderer/frame/blended.h"
 #include "renderer/frame/edges.h"
 #include "protocol/memory.h"
 #include "renderer/frame/layers.h"
@@ -19,11 +20,16 @@ static enum pen_pixel pixel_of(const struct pen_output *output, uint32_t layer)
     return output->bit_depth == 16 ? PEN_PIXEL_RGBA32F : PEN_PIXEL_RGBA8;
 }
 
-bool frame_output_is_direct(const struct pen_request *r)
+static bool is_direct(const struct pen_request *r, bool layered)
 {
-    return r->output.layer == PEN_LAYER_BEAUTY && r->antialias == 1 &&
+    return r->output.layer == PEN_LAYER_BEAUTY && r->antialias == 1 && !layered &&
            !pen_request_is_transparent(r) && /* alpha is rounded once */
            pixel_of(&r->output, PEN_LAYER_BEAUTY) == PEN_PIXEL_RGBA8;
+}
+
+bool frame_output_is_direct(const struct frame_job *job)
+{
+    return is_direct(job->request, frame_is_layered(job));
 }
 
 static const GLenum internal_formats[] = {GL_RGBA8, GL_RGBA16F, GL_RGBA32F};
@@ -84,14 +90,14 @@ static bool convert(const struct frame_job *job, const struct output_block *bloc
     bool raw, struct pen_error *error)
 {
     struct frame_targets *t = job->targets;
+    const struct gbuffer *g = frame_data_gbuffer(job);
     char defines[64];
     snprintf(defines, sizeof defines, "#define LAYER layer_%s\n%s", pen_layers[layer].name,
         raw ? "#define RAW true\n" : "#define RAW false\n");
-    struct pass_texture textures[] = {
-        {UNIT_DEPTH, t->gbuffer.depth.texture.name, GL_SAMPLE_NEAREST},
-        {UNIT_NORMAL, t->gbuffer.normal.texture.name, GL_SAMPLE_NEAREST},
-        {UNIT_ALBEDO, t->gbuffer.albedo.texture.name, GL_SAMPLE_NEAREST},
-        {UNIT_SURFACE, t->gbuffer.surface.texture.name, GL_SAMPLE_NEAREST},
+    struct pass_texture textures[] = {{UNIT_DEPTH, g->depth.texture.name, GL_SAMPLE_NEAREST},
+        {UNIT_NORMAL, g->normal.texture.name, GL_SAMPLE_NEAREST},
+        {UNIT_ALBEDO, g->albedo.texture.name, GL_SAMPLE_NEAREST},
+        {UNIT_SURFACE, g->surface.texture.name, GL_SAMPLE_NEAREST},
         {UNIT_SOURCE, source_of(t, layer)->name, GL_SAMPLE_NEAREST}};
     return pass_fill(job->ctx,
         &(struct pass_fill){.name = "output",
@@ -154,7 +160,7 @@ bool frame_output_read(const struct frame_job *job, const struct view *view, uin
         if (r->output.layer == PEN_LAYER_ALL ? !has : r->output.layer != layer)
             continue;
         enum pen_pixel pixel = pixel_of(&r->output, layer);
-        bool direct = frame_output_is_direct(r);
+        bool direct = frame_output_is_direct(job);
         bool smooth = pen_layers[layer].source == PEN_SOURCE_BEAUTY && frame_edges_are_smooth(job);
         if (!direct)
             fit_color(job->targets, r, pixel);
@@ -169,17 +175,20 @@ bool frame_output_read(const struct frame_job *job, const struct view *view, uin
     return true;
 }
 
-/* Bytes per pixel: the G-buffer without emission; what most methods have of their own at some time. */
+/* Bytes per pixel: the G-buffer without emission; what blended layers have besides; what most methods
+ * have of their own at some time. */
 #define GBUFFER_BYTES 20
+#define LAYER_BYTES 56
 #define METHOD_BYTES 16
 
-uint64_t frame_output_estimate(const struct pen_request *r, uint32_t lights)
+uint64_t frame_output_estimate(const struct pen_request *r, uint32_t lights, bool blended)
 {
-    bool direct = frame_output_is_direct(r);
+    bool layered = blended && frame_needs(r, PEN_SOURCE_BEAUTY), direct = is_direct(r, layered);
     uint64_t bytes = GBUFFER_BYTES + METHOD_BYTES + 8ull * (lights ? lights : 1) +
                      (r->output.format == PEN_EXR || r->output.bit_depth == 16 ? 16 : 4) +
                      (direct ? 4 : 0);
     bytes += !direct && frame_needs(r, PEN_SOURCE_BEAUTY) ? 16 : 0;
+    bytes += layered ? LAYER_BYTES : 0;
     bytes += frame_needs(r, PEN_SOURCE_VISIBILITY) ? 16 : 0;
     bytes += frame_needs(r, PEN_SOURCE_CLASSES) ? 4 : 0;
     bytes += frame_needs(r, PEN_SOURCE_VARIANCE) ? 4 : 0;

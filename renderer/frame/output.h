@@ -4,10 +4,11 @@
 #include "renderer/picture.h"
 
 /* True when one 8-bit beauty image of one frame is all that is wanted: shading then resolves. */
-bool frame_output_is_direct(const struct pen_request *request);
+bool frame_output_is_direct(const struct frame_job *job);
 
-/* About what all targets of a picture will take, bytes, with what methods commonly add. */
-uint64_t frame_output_estimate(const struct pen_request *request, uint32_t lights);
+/* About what all targets of a picture will take, bytes, with what methods commonly add. `blended`: of
+ * a scene with blended surfaces. */
+uint64_t frame_output_estimate(const struct pen_request *request, uint32_t lights, bool blended);
 
 /* Makes targets->color (and its framebuffer) fit the output. */
 void frame_output_fit(struct frame_targets *targets, const struct pen_request *request);

@@ -44,23 +44,24 @@ void sky_choose(struct shade_block *b, const struct pen_request *r, const struct
     }
 }
 
-bool sky_occlusion(const struct frame_job *job, struct pen_error *error)
+bool sky_occlusion(const struct frame_job *job, const struct gbuffer *gbuffer,
+    const struct gl_texture *solid, struct pen_error *error)
 {
     struct frame_targets *t = job->targets;
     uint32_t width = (job->request->width + 1) / 2, height = (job->request->height + 1) / 2;
     const struct occlusion_block reach = {
         .reach = {0.6f * scene_radius(job->scene), 0.35f * (float)job->request->height}};
-    struct pass_texture textures[] = {
-        {UNIT_DEPTH, t->gbuffer.depth.texture.name, GL_SAMPLE_NEAREST},
-        {UNIT_NORMAL, t->gbuffer.normal.texture.name, GL_SAMPLE_NEAREST},
-        {UNIT_SOURCE, 0, GL_SAMPLE_NEAREST}};
+    struct pass_texture textures[] = {{UNIT_DEPTH, gbuffer->depth.texture.name, GL_SAMPLE_NEAREST},
+        {UNIT_NORMAL, gbuffer->normal.texture.name, GL_SAMPLE_NEAREST},
+        {UNIT_SOLID, solid ? solid->name : 0, GL_SAMPLE_NEAREST}};
     gl_target_fit(&t->sky_open[0], GL_R8, width, height, 0, 1);
     gl_target_fit(&t->sky_open[1], GL_R8, width, height, 0, 1);
     struct pass_fill pass = {.name = "sky occlusion",
         .fragment = "occlusion.frag",
+        .defines = solid ? "#define LAYER\n" : NULL,
         .stage = PEN_STAGE_SHADE,
         .textures = textures,
-        .texture_count = 2,
+        .texture_count = solid ? 3 : 2,
         .framebuffer = t->sky_open[0].framebuffer,
         .width = width,
         .height = height,
@@ -68,9 +69,11 @@ bool sky_occlusion(const struct frame_job *job, struct pen_error *error)
         .extra_bytes = sizeof reach};
     if (!pass_fill(job->ctx, &pass, error))
         return false;
-    textures[2].name = t->sky_open[0].texture.name;
+    textures[2] =
+        (struct pass_texture){UNIT_SOURCE, t->sky_open[0].texture.name, GL_SAMPLE_NEAREST};
     pass.name = "sky occlusion blur";
     pass.fragment = "occlusion_blur.frag";
+    pass.defines = NULL;
     pass.texture_count = 3;
     pass.framebuffer = t->sky_open[1].framebuffer;
     pass.extra = NULL;

@@ -9,5 +9,7 @@ void sky_choose(
     struct shade_block *block, const struct pen_request *request, const struct view *view);
 
 /* Draws how much of the sky each pixel's surface sees into targets->sky_open[1], R8, half the
- * picture's size. The G-buffer is there. */
-bool sky_occlusion(const struct frame_job *job, struct pen_error *error);
+ * picture's size. `solid`: depth of what stands around the surfaces of the G-buffer besides them, or
+ * NULL. */
+bool sky_occlusion(const struct frame_job *job, const struct gbuffer *gbuffer,
+    const struct gl_texture *solid, struct pen_error *error);

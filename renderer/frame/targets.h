@@ -3,12 +3,21 @@
 #include "renderer/technique.h"
 
 #define FRAME_MEANS 3
+
 struct frame_targets {
     struct gbuffer gbuffer;
     struct gl_target vis;    /* RGBA16F array, a layer per light; aimed at the light at work */
     struct gl_target color;  /* what is read back */
     struct gl_target stairs; /* the same before its edges are smooth */
     struct gl_target places; /* D32F, EDGE_PLACES samples, of some rows of the picture */
+    /* Of scenes with blended surfaces (blended.h); `gbuffer` is then of what is solid: */
+    struct gbuffer layer;          /* of one layer of them; at last what data layers say */
+    struct gl_target layer_before; /* D32F */
+    struct gl_target front_depth;  /* D32F: the first layer's */
+    struct gl_target front_normal; /* RGBA16; for smooth edges, as the next */
+    struct gl_target front_places; /* as places */
+    struct gl_target layers;       /* RGBA32F: sum over the layers of one jittered frame */
+    struct gl_target layers_kept;  /* the same, while a picture is shown */
     /* Sums over lights and jittered frames: */
     struct gl_target beauty, visibility; /* RGBA32F */
     struct gl_target classes;            /* RG16F: times proved lit, in umbra */

@@ -1,5 +1,6 @@
 #include "renderer/light/meter.h"
 #include <cglm/cglm.h>
+#include <math.h>
 #include <stdlib.h>
 
 static float luminance(const float c[3])
@@ -82,4 +83,17 @@ float light_meter(
                                         : measure(lights, count, &moment->samples));
     }
     return level > 0 ? level : 1;
+}
+
+/* What faces the lights squarely comes out just below white, with the sky's share on top. The key
+ * light is made to measure: its level is 1. */
+void light_choose_exposure(struct pen_request *r, const struct light *lights, uint32_t count,
+    bool scenes_own, const struct scene *scene)
+{
+    bool key_light = scenes_own && !scene->blob.light_count;
+    float level = key_light ? 1 : light_meter(lights, count, scenes_own, scene);
+    if (r->exposure_ev == PEN_AUTO)
+        r->exposure_ev = glm_clamp(log2f(0.72f / level), -24, 24);
+    if (r->sky_level == PEN_AUTO)
+        r->sky_level = fminf(level, 1e6f);
 }

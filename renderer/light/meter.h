@@ -9,3 +9,6 @@
  * reaches anything. */
 float light_meter(
     const struct light *lights, uint32_t count, bool scenes_own, const struct scene *scene);
+/* Fills in the request's exposure and the sky's level, where it leaves them open. */
+void light_choose_exposure(struct pen_request *request, const struct light *lights, uint32_t count,
+    bool scenes_own, const struct scene *scene);

@@ -230,7 +230,8 @@ static void make_groups(struct scene *s)
                 .double_sided = (m->flags & PSC_DOUBLE_SIDED) != 0,
                 .mirrored = (s->blob.instances[sorted[i].instance].flags & PSC_MIRRORED) != 0,
                 .closed = is_closed(s, sorted[i].instance),
-                .alpha = m->alpha_mode != PSC_OPAQUE};
+                .alpha = m->alpha_mode != PSC_OPAQUE,
+                .blend = m->alpha_mode == PSC_BLEND};
         }
         s->groups[s->group_count - 1].count++;
     }
@@ -469,6 +470,8 @@ uint64_t scene_draw(struct scene *s, const struct cull_view *view, const struct 
     for (uint32_t g = 0; g < s->group_count; g++) {
         runs[g].first = total;
         runs[g].cull_back = culls_back(s, &s->groups[g], view);
+        if (pass->blended && !s->groups[g].blend)
+            continue;
         for (uint32_t i = 0; i < s->groups[g].count; i++) {
             uint32_t instance = s->order[s->groups[g].first + i];
             if (!pass->hidden || !pass->hidden[instance])

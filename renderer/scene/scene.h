@@ -19,6 +19,7 @@ struct scene_group {
     bool double_sided, mirrored;
     bool closed; /* its surfaces are closed, face outwards and have no holes */
     bool alpha;  /* MASK or BLEND: fragments may be discarded */
+    bool blend;
 };
 
 /* What a floor above keeps with a scene until that leaves the GPU: a member of a struct of its own,
@@ -111,6 +112,7 @@ struct scene_pass {
     bool full; /* draws with all attributes and textures; else positions only where it can */
     bool front_is_clockwise; /* the target's y axis is flipped */
     const bool *hidden;      /* instances to leave out, or NULL */
+    bool blended;            /* BLEND materials alone */
 };
 /* Returns the triangles drawn. The caller has bound framebuffer, viewport and depth state. */
 uint64_t scene_draw(

@@ -155,9 +155,18 @@ bool view_resolve(struct view *v, struct pen_camera *c, const struct scene *scen
     return true;
 }
 
-void view_jitter(struct view *v, float x, float y)
+/* Of the Halton sequence in bases 2 and 3, centred on 0. */
+void view_jitter(struct view *v, uint32_t index)
 {
-    make_matrices(v, x, y);
+    float at[2] = {0, 0};
+    for (uint32_t k = 0; k < 2; k++) {
+        float scale = 1;
+        for (uint32_t i = index + 1; i; i /= k + 2) {
+            scale /= (float)(k + 2);
+            at[k] += scale * (float)(i % (k + 2));
+        }
+    }
+    make_matrices(v, at[0] - 0.5f, at[1] - 0.5f);
 }
 
 void view_to_cull(const struct view *v, struct cull_view *cull)

@@ -16,6 +16,6 @@ struct view {
 bool view_resolve(struct view *view, struct pen_camera *camera, const struct scene *scene,
     uint32_t width, uint32_t height, struct pen_error *error);
 
-/* Moves the pixel grid by (x, y) pixels, |x|, |y| <= 0.5, for antialiasing. */
-void view_jitter(struct view *view, float x, float y);
+/* Moves the pixel grid within half a pixel for antialiasing: to point `index` of a sequence. */
+void view_jitter(struct view *view, uint32_t index);
 void view_to_cull(const struct view *view, struct cull_view *cull);

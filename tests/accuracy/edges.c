@@ -3,12 +3,10 @@
  *
  * usage: accuracy_edges [SCENE.pscene ...] */
 #include "protocol/json_request.h"
-#include "tests/accuracy/harness.h"
+#include "tests/accuracy/quads.h"
 #include "tests/unit/check.h"
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 
 #define WIDTH 400
 #define HEIGHT 300
@@ -83,12 +81,12 @@ static double rmse(const struct pen_frame *a, const struct pen_frame *b, const u
     return sqrt(sum / (3 * fmax(count, 1)));
 }
 
-static void check_scene(const char *name, const uint8_t *id, const char *more, double most)
+/* mask: of its edge pixels. */
+static void check_edges(
+    const char *name, const uint8_t *id, const char *more, const uint8_t *mask, double most)
 {
     char settings[512], text[1024];
     struct pen_frame truth, stairs, smooth;
-    snprintf(settings, sizeof settings, "technique=pcss&%s", more);
-    uint8_t *mask = edge_pixels(id, settings);
     snprintf(
         settings, sizeof settings, "technique=pcss&width=%d&height=%d&%s", WIDTH, HEIGHT, more);
     snprintf(text, sizeof text, "%s&antialias=64", settings);
@@ -109,7 +107,42 @@ static void check_scene(const char *name, const uint8_t *id, const char *more, d
     pen_frame_finish(&truth);
     pen_frame_finish(&stairs);
     pen_frame_finish(&smooth);
+}
+
+static void check_scene(const char *name, const uint8_t *id, const char *more, double most)
+{
+    char settings[512];
+    snprintf(settings, sizeof settings, "technique=pcss&%s", more);
+    uint8_t *mask = edge_pixels(id, settings);
+    check_edges(name, id, more, mask, most);
     free(mask);
+}
+
+/* Panes before slats: edges of both, and of the slats through the panes. */
+static void check_panes(void)
+{
+    static const char view[] = "camera.eye=0,0,4&camera.target=0,0,0&camera.fov_y_deg=40&sky=on";
+    enum { SLATS = 5, PANES = 2 };
+    struct quad quads[SLATS + PANES];
+    uint8_t id[PEN_ID_BYTES], *masks[2];
+    for (int i = 0; i < SLATS; i++)
+        quads[i] = (struct quad){{0.55f * (float)i - 1.1f, 0, -0.2f * (float)i}, {0.13f, 0.03f, 0},
+            {-0.2f, 0.9f, 0.1f}, {0.8f, 0.3f, 0.1f, 1}};
+    quads[SLATS] = (struct quad){
+        {-0.3f, 0.1f, 0.5f}, {0.6f, 0.17f, 0.1f}, {-0.13f, 0.5f, 0}, {0.2f, 0.5f, 0.9f, 1}};
+    quads[SLATS + 1] = (struct quad){
+        {0.4f, -0.2f, 0.9f}, {0.4f, -0.11f, 0}, {0.07f, 0.4f, 0.1f}, {0.9f, 0.9f, 0.3f, 1}};
+    for (int i = 0; i < 2; i++) { /* with panes that are solid, and without them */
+        load_quads(quads, i ? SLATS : SLATS + PANES, false, id);
+        masks[i] = edge_pixels(id, view);
+    }
+    for (uint32_t i = 0; i < WIDTH * HEIGHT; i++)
+        masks[0][i] |= masks[1][i];
+    quads[SLATS].color[3] = quads[SLATS + 1].color[3] = 0.45f;
+    load_quads(quads, SLATS + PANES, false, id);
+    check_edges("panes", id, view, masks[0], 0.5);
+    free(masks[0]);
+    free(masks[1]);
 }
 
 int main(int argc, char **argv)
@@ -125,5 +158,6 @@ int main(int argc, char **argv)
     check_scene("columns", id, "sky=on", 0.5);
     harness_scene(&(struct pen_generated_options){.kind = PEN_GENERATED_HAIRBALL}, id);
     check_scene("hairball", id, "sky=on", 0.5);
+    check_panes();
     CHECK_DONE();
 }

@@ -1,14 +1,17 @@
 #include "renderer/passes/draw/gbuffer.h"
 #include "renderer/passes/draw/turn.h"
+#include <stdio.h>
 #include <string.h>
 
 #define FIRST_PIXELS (1u << 17)
 
-static void fit(struct gbuffer *g, uint32_t width, uint32_t height, bool emission)
+static void fit(
+    struct gbuffer *g, uint32_t width, uint32_t height, bool emission, enum gbuffer_kind kind)
 {
     bool made = gl_target_fit(&g->depth, GL_DEPTH_COMPONENT32F, width, height, 0, 1);
     made |= gl_target_fit(&g->normal, GL_RGBA16, width, height, 0, 1);
-    made |= gl_target_fit(&g->albedo, GL_RGBA8, width, height, 0, 1);
+    made |= gl_target_fit(
+        &g->albedo, kind == GBUFFER_LAYER ? GL_RGBA16 : GL_RGBA8, width, height, 0, 1);
     made |= gl_target_fit(&g->surface, GL_RGBA8, width, height, 0, 1);
     if (emission)
         made |= gl_target_fit(&g->emission, GL_R11F_G11F_B10F, width, height, 0, 1);
@@ -24,8 +27,13 @@ static void fit(struct gbuffer *g, uint32_t width, uint32_t height, bool emissio
     g->framebuffer = gl_framebuffer_create(colors, emission ? 4 : 3, &g->depth.texture);
 }
 
-static GLuint program(struct technique_ctx *ctx, const char *defines, struct pen_error *error)
+static GLuint program(struct technique_ctx *ctx, const char *use, bool emission,
+    enum gbuffer_kind kind, struct pen_error *error)
 {
+    static const char *const kinds[] = {"", "#define SOLID\n", "#define LAYER\n"};
+    char defines[128];
+    snprintf(defines, sizeof defines, "#define FULL\n%s%s%s", emission ? "#define EMIT\n" : "", use,
+        kinds[kind]);
     struct gl_program_desc desc = {
         .vertex = "geometry.vert", .fragment = "gbuffer.frag", .defines = defines};
     return gl_programs_get(ctx->programs, &desc, error);
@@ -65,20 +73,14 @@ static uint64_t draw_band(struct technique_ctx *ctx, struct scene *scene, const 
 }
 
 bool pass_gbuffer(struct technique_ctx *ctx, struct scene *scene, const struct view *view,
-    bool ground, struct gbuffer *g, uint64_t *triangles, struct pen_error *error)
+    const struct gbuffer_pass *how, struct gbuffer *g, uint64_t *triangles, struct pen_error *error)
 {
     bool emission = scene->has_emission || scene->has_unlit;
-    fit(g, view->width, view->height, emission);
-    struct scene_pass pass = {.full = true};
-    pass.opaque = program(ctx, emission ? "#define FULL\n#define EMIT\n" : "#define FULL\n", error);
-    pass.textured = program(ctx,
-        emission ? "#define FULL\n#define EMIT\n#define TEXTURED\n"
-                 : "#define FULL\n#define TEXTURED\n",
-        error);
-    GLuint flat = program(ctx,
-        emission ? "#define FULL\n#define EMIT\n#define GROUND\n"
-                 : "#define FULL\n#define GROUND\n",
-        error);
+    fit(g, view->width, view->height, emission, how->kind);
+    struct scene_pass pass = {.full = true, .blended = how->kind == GBUFFER_LAYER};
+    pass.opaque = program(ctx, "", emission, GBUFFER_HASHED, error);
+    pass.textured = program(ctx, "#define TEXTURED\n", emission, how->kind, error);
+    GLuint flat = program(ctx, "#define GROUND\n", emission, GBUFFER_HASHED, error);
     if (!pass.opaque || !pass.textured || !flat)
         return false;
     gl_timer_begin(&ctx->timer, PEN_STAGE_GBUFFER, "gbuffer");
@@ -89,7 +91,12 @@ bool pass_gbuffer(struct technique_ctx *ctx, struct scene *scene, const struct v
     bool more = true, ok = true;
     pass_bands_begin(ctx, &bands, view->width, view->height, FIRST_PIXELS);
     while (ok && more) {
-        *triangles += draw_band(ctx, scene, view, &pass, ground ? flat : 0, &bands, g);
+        if (how->kind == GBUFFER_LAYER) {
+            gl.BindTextureUnit(UNIT_BEFORE, how->before->name);
+            gl.BindTextureUnit(UNIT_SOLID, how->solid->name);
+            gl.ProgramUniform1i(pass.textured, LOCATION_LAST, how->last);
+        }
+        *triangles += draw_band(ctx, scene, view, &pass, how->ground ? flat : 0, &bands, g);
         ok = pass_bands_next(ctx, &bands, &more, error);
     }
     gl_timer_end(&ctx->timer);

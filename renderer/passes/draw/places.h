@@ -5,8 +5,11 @@
 #define SHARED_ROWS "renderer/shaders/frame/edges.def"
 #include "renderer/shared/rows_c.h"
 
+/* Whose depths. */
+enum places_kind { PLACES_ALL, PLACES_SOLID, PLACES_BLENDED }; /* solid: see GBUFFER_SOLID */
+
 /* What the view sees at EDGE_PLACES places of the pixels in `rows` rows from `first`, into a target
  * of so many samples. `where`: the places. */
 bool pass_places(struct technique_ctx *ctx, struct scene *scene, const struct view *view,
-    bool ground, uint32_t first, uint32_t rows, struct gl_target *depths, struct edges_block *where,
-    struct pen_error *error);
+    enum places_kind kind, bool ground, uint32_t first, uint32_t rows, struct gl_target *depths,
+    struct edges_block *where, struct pen_error *error);

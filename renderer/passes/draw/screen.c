@@ -37,7 +37,7 @@ struct drawing {
     struct technique_ctx *ctx;
     GLuint program, framebuffer, extra;
     uint32_t width, height;
-    bool add, least, mute;
+    bool add, under, least, mute;
     const struct gl_texture *tiles; /* NULL: all pixels */
     int32_t tile_class, tile_px;
     struct pass_texture own[4]; /* what a method's pass always reads */
@@ -72,6 +72,10 @@ static void draw_piece(const struct drawing *d, const struct pass_bands *bands)
     if (d->add) {
         gl.Enable(GL_BLEND);
         gl.BlendFunc(GL_ONE, GL_ONE);
+    }
+    if (d->under) {
+        gl.Enable(GL_BLEND);
+        gl.BlendFunc(GL_ONE_MINUS_DST_ALPHA, GL_ONE);
     }
     if (d->least) {
         gl.Enable(GL_BLEND);
@@ -190,6 +194,7 @@ bool pass_fill(struct technique_ctx *ctx, const struct pass_fill *pass, struct p
         .width = pass->width,
         .height = pass->height,
         .add = pass->add,
+        .under = pass->under,
         .mute = pass->mute,
         .tiles = pass->tiles,
         .tile_class = TILE_UNDECIDED,

@@ -40,7 +40,8 @@ struct pass_fill {
     GLuint framebuffer;
     uint32_t width, height;
     bool add;
-    bool mute;                      /* no colour is written: the pass counts */
+    bool under; /* goes behind what is there: colours times alpha, nearest first */
+    bool mute;  /* no colour is written: the pass counts */
     const struct gl_texture *tiles; /* as above */
     uint32_t tile_px;
     const void *extra;

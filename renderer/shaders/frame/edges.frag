@@ -3,6 +3,8 @@
 // RESOLVED: the picture holds display values, else sums; RAW: a file of radiance is wanted. Else it
 // is light as the display gives it off that is averaged: what is too bright for it has no stairs.
 // ALONE: only what the file holds of each pixel without its neighbours.
+// LAYERED: blended surfaces lie in front of some pixels, and a plane has to explain what is solid
+// while the plane of the first of them explains what is nearest.
 #include "view.glsl"
 #include "octahedral.glsl"
 #include "display.glsl"
@@ -12,6 +14,11 @@
 layout(binding = UNIT_NORMAL) uniform sampler2D g_normal;
 layout(binding = UNIT_PLACES) uniform sampler2DMS place_depths; // of some rows
 layout(binding = UNIT_SOURCE) uniform sampler2D picture;
+
+#ifdef LAYERED
+layout(binding = UNIT_FRONT_NORMAL) uniform sampler2D front_normal;
+layout(binding = UNIT_FRONT_PLACES) uniform sampler2DMS front_places;
+#endif
 
 layout(location = 0) out vec4 color;
 
@@ -40,14 +47,30 @@ vec4 light_of(vec4 c)
 
 // Reversed depth is linear in the picture along a plane: its value at the pixel's centre, and its
 // gradient per pixel. The normal's length cancels out.
-vec3 plane_at(ivec2 pixel, vec3 right, vec3 up)
+vec3 plane_of(float depth, vec2 normal, ivec2 pixel, vec3 right, vec3 up)
 {
-    float depth = depth_at(pixel);
-    vec3 n = octahedral_direction(texelFetch(g_normal, pixel, 0).xy);
+    vec3 n = octahedral_direction(normal);
     vec2 centred = vec2(pixel) + 0.5 - 0.5 * view.viewport.xy;
     vec2 slope = vec2(dot(n, right), -dot(n, up)) / view.eye.w;
     return vec3(
         depth, slope * (depth / min(dot(n, view.forward.xyz) + dot(slope, centred), -1e-4)));
+}
+
+struct Planes {
+    vec3 solid, front;
+};
+
+Planes planes_at(ivec2 pixel, vec3 right, vec3 up)
+{
+    Planes p;
+    p.solid = plane_of(depth_at(pixel), texelFetch(g_normal, pixel, 0).xy, pixel, right, up);
+    p.front = p.solid;
+#ifdef LAYERED
+    float depth = texelFetch(front_depth, pixel, 0).r;
+    if (depth > 0.0)
+        p.front = plane_of(depth, texelFetch(front_normal, pixel, 0).xy, pixel, right, up);
+#endif
+    return p;
 }
 
 // How well the plane of the pixel at `offset` explains the depths: 10 where it passes through them,
@@ -61,6 +84,16 @@ vec4 match(vec3 plane, vec4 depths, vec2 offset)
     return plane.x == 0.0 ? background : rise / (miss + 0.1 * rise);
 }
 
+// Both planes of the pixel at `offset`.
+vec4 match_both(Planes planes, vec4 solid, vec4 front, vec2 offset)
+{
+    vec4 how = match(planes.solid, solid, offset);
+#ifdef LAYERED
+    how = min(how, match(planes.front, front, offset));
+#endif
+    return how;
+}
+
 void main()
 {
     ivec2 pixel = ivec2(gl_FragCoord.xy), last = ivec2(view.viewport.xy) - 1;
@@ -71,15 +104,20 @@ void main()
     // Loops, since software rasterisers leave them out where no pixel needs them.
     int around = may_show_edge(pixel, last) ? 9 : 0;
     vec3 right = vec3(0.0), up = vec3(0.0);
-    vec4 depths = vec4(0.0), open = vec4(0.0);
+    vec4 depths = vec4(0.0), front = vec4(0.0), open = vec4(0.0);
     for (int once = 0; once < around; once += 9) {
         right = normalize(cross(view.forward.xyz,
             vec3(view.world_to_clip[0].y, view.world_to_clip[1].y, view.world_to_clip[2].y)));
         up = cross(right, view.forward.xyz);
         for (int i = 0; i < EDGE_PLACES; i++)
             depths[i] = texelFetch(place_depths, pixel - ivec2(0, edge.rows.x), i).r;
+#ifdef LAYERED
+        for (int i = 0; i < EDGE_PLACES; i++)
+            front[i] = max(depths[i], texelFetch(front_places, pixel - ivec2(0, edge.rows.x), i).r);
+#endif
         // 0 where the pixel's own plane explains the place.
-        open = clamp(4.0 - 0.6 * match(plane_at(pixel, right, up), depths, vec2(0.0)), 0.0, 1.0);
+        vec4 own = match_both(planes_at(pixel, right, up), depths, front, vec2(0.0));
+        open = clamp(4.0 - 0.6 * own, 0.0, 1.0);
         around = any(greaterThan(open, vec4(0.0))) ? 9 : 0;
     }
     vec4 sums[EDGE_PLACES], weights = vec4(0.0);
@@ -87,7 +125,7 @@ void main()
         sums[i] = vec4(0.0);
     for (int k = 0; k < around; k++) {
         ivec2 at = clamp(pixel + ivec2(k % 3, k / 3) - 1, ivec2(0), last);
-        vec4 weight = match(plane_at(at, right, up), depths, vec2(at - pixel));
+        vec4 weight = match_both(planes_at(at, right, up), depths, front, vec2(at - pixel));
         weight *= k == 4 ? vec4(1.0) : open;
         weights += weight;
         vec4 light = light_of(texelFetch(picture, at, 0));

@@ -1,13 +1,18 @@
 // How much of the sky a surface sees past what is near it on the screen: horizons along slices
 // through the depth buffer, the arc between them integrated in closed form (Jimenez et al. 2016,
 // practical real-time strategies for accurate indirect occlusion). Half the picture's resolution;
-// the slices turn in a 4 x 4 pattern that occlusion_blur.frag averages away.
+// the slices turn in a 4 x 4 pattern that occlusion_blur.frag averages away. LAYER: what is solid
+// stands around a blended layer too.
 #include "view.glsl"
 #include "octahedral.glsl"
 #include "occlusion.def"
 
 layout(binding = UNIT_DEPTH) uniform sampler2D g_depth;
 layout(binding = UNIT_NORMAL) uniform sampler2D g_normal;
+#ifdef LAYER
+layout(binding = UNIT_SOLID) uniform sampler2D depth_solid;
+#endif
+
 layout(location = 0) out float open;
 
 const int SLICES = 2, STEPS = 4;
@@ -60,6 +65,9 @@ void main()
             vec2 moved = along * side * (t * t * reach + 1.5);
             ivec2 q = pixel + ivec2(round(moved.x), -round(moved.y));
             float there = texelFetch(g_depth, clamp(q, ivec2(0), size - 1), 0).r;
+#ifdef LAYER
+            there = max(there, texelFetch(depth_solid, clamp(q, ivec2(0), size - 1), 0).r);
+#endif
             vec3 to = in_view(q, max(there, 1e-20)) - p;
             float far2 = dot(to, to);
             // Beyond the radius nothing counts; towards it the horizon sinks.

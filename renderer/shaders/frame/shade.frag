@@ -1,8 +1,10 @@
 // Direct light of all lights times their visibility, plus ambient and emission. RESOLVE: there is
 // one frame only, so the display curve is applied here. TRANSPARENT: alpha is how much of the pixel
 // the scene covers; what is summed over frames is multiplied by it. CATCHER: of the ground only the
-// shadow is there, as black that covers the more the less light arrives. LIGHTS is a constant:
-// unrolled, each light's uniforms are read once for all pixels instead of gathered per pixel.
+// shadow is there, as black that covers the more the less light arrives. LAYERED: the picture is
+// summed up of layers, and this is what is solid or, LAYER, a blended one, times its alpha. LIGHTS
+// is a constant: unrolled, each light's uniforms are read once for all pixels instead of gathered
+// per pixel.
 #include "view.glsl"
 #include "octahedral.glsl"
 #include "irradiance.glsl"
@@ -227,7 +229,12 @@ void main()
 #ifdef SKY
     background += sky_backdrop(-v.y);
 #endif
-    if (hit && albedo.a == 0.0) { // the ground fades into the background, so that it has no edge
+#ifdef LAYER
+    bool ground = false;
+#else
+    bool ground = hit && albedo.a == 0.0;
+#endif
+    if (ground) { // the ground fades into the background, so that it has no edge
         float d = distance(p.xz, view.ground.xz) / view.ground.w;
         alpha = 1.0 - smoothstep(0.15, 0.6, d);
 #ifdef CATCHER
@@ -242,8 +249,13 @@ void main()
 #else
     vec4 covered = vec4(alpha > 0.0 ? mix(sum, background, 1.0 - alpha) : background, 1.0);
 #endif
-#ifdef RESOLVE
+#ifdef LAYER
+    alpha *= albedo.a;
+    color = alpha > 0.0 ? vec4(sum * alpha, alpha) : vec4(0.0);
+#elif defined(RESOLVE)
     color = vec4(display_encode(covered.rgb), covered.a);
+#elif defined(LAYERED)
+    color = vec4(covered.rgb * covered.a, covered.a);
 #else
     color = vec4(covered.rgb * covered.a, covered.a) * view.display.w;
 #endif

@@ -1,5 +1,7 @@
 // What shading needs of the nearest surface. TEXTURED: material textures are bound and alpha is
-// tested; EMIT: a fourth target takes emission.
+// tested; EMIT: a fourth target takes emission. Blended surfaces are there in a share alpha of
+// their pixels, or SOLID: where they hide what is behind them, or LAYER: the nearest behind the
+// layer before, of those that do not; the last layer is of a share again, for all behind it.
 #include "view.glsl"
 #include "octahedral.glsl"
 #include "hash.glsl"
@@ -13,10 +15,17 @@ in vec4 v_color;
 flat in uint v_material;
 
 layout(location = 0) out vec4 out_normal; // geometric, shading
-layout(location = 1) out vec4 out_albedo; // square root of albedo; a: 1 a lit surface, 0 the ground
+// Square root of albedo; a: 1 a lit surface, 0 the ground. LAYER: alpha.
+layout(location = 1) out vec4 out_albedo;
 layout(location = 2) out vec4 out_surface; // roughness, metallic, occlusion, F0 / 0.08
 #ifdef EMIT
 layout(location = 3) out vec3 out_emission;
+#endif
+
+#ifdef LAYER
+layout(binding = UNIT_BEFORE) uniform sampler2D depth_before; // 1: there is none
+layout(binding = UNIT_SOLID) uniform sampler2D depth_solid;
+layout(location = LOCATION_LAST) uniform int last;
 #endif
 
 // Specular-glossiness to metallic-roughness: the metallic value whose mixture of base colour and
@@ -69,10 +78,23 @@ void main()
     float metallic = m.surface.x, roughness = m.surface.y, occlusion = 1.0;
     float specular = min(0.5 * max(m.specular.r, max(m.specular.g, m.specular.b)), 1.0);
     vec3 f0 = m.specular.rgb;
-    float glossiness = m.specular.a;
+    float glossiness = m.specular.a, cover = 1.0;
 #ifdef TEXTURED
     vec4 base = material_base(v_material, v_uv, v_color);
-    float threshold = unit_float(hash3(uvec3(gl_FragCoord.xy, uint(view.display.z))).x);
+#ifdef SOLID
+    float threshold = solid_alpha;
+#else
+    float threshold = pixel_threshold(gl_FragCoord.xyz, uint(view.display.z));
+#endif
+#ifdef LAYER
+    // A little is taken twice, rather than by neither where two programs round differently.
+    float before = texelFetch(depth_before, ivec2(gl_FragCoord.xy), 0).r;
+    float solid = texelFetch(depth_solid, ivec2(gl_FragCoord.xy), 0).r;
+    if (gl_FragCoord.z >= before || gl_FragCoord.z < solid || base.a > solid_alpha + 1e-5)
+        discard;
+    threshold = last != 0 ? threshold : 0.0;
+    cover = last != 0 ? 1.0 : base.a;
+#endif
     if (alpha_is_cut(v_material, base.a, threshold))
         discard;
     if (material_has(v_material, SCENE_UNIT_SURFACE)) {
@@ -117,7 +139,7 @@ void main()
         specular = 0.0;
     }
     out_normal = vec4(octahedral_encode(geometric), octahedral_encode(shading));
-    out_albedo = vec4(sqrt(clamp(albedo, 0.0, 1.0)), 1.0);
+    out_albedo = vec4(sqrt(clamp(albedo, 0.0, 1.0)), cover);
     out_surface = vec4(roughness, metallic, occlusion, specular);
 #ifdef EMIT
     out_emission = emission;

@@ -16,3 +16,9 @@ float unit_float(uint bits)
 {
     return float(bits >> 8) * (1.0 / 16777216.0);
 }
+
+// In [0, 1), for each surface that a pixel meets: those behind one another are there independently.
+float pixel_threshold(vec3 at, uint seed)
+{
+    return unit_float(hash3(uvec3(at.xy, seed + floatBitsToUint(at.z))).x);
+}

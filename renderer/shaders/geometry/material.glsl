@@ -40,11 +40,14 @@ vec4 material_base(uint material, vec4 uv, vec4 color)
     return base;
 }
 
-// Blended surfaces are cut by a hashed threshold: accumulation over frames resolves it.
+// A blended surface that hides all but this share of what is behind it is solid.
+const float solid_alpha = 0.998;
+
+// Blended surfaces are cut by a threshold; an alpha that is no number is 0.
 bool alpha_is_cut(uint material, float alpha, float threshold)
 {
     uint mode = materials[material].flags.x;
     if (mode == PSC_MASK)
         return alpha < materials[material].emissive.w;
-    return mode == PSC_BLEND && alpha <= threshold;
+    return mode == PSC_BLEND && !(alpha > threshold);
 }

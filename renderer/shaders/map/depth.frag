@@ -22,7 +22,7 @@ void main()
 #endif
 #ifdef ALPHA
     float alpha = material_base(v_material, v_uv, v_color).a;
-    float threshold = unit_float(hash3(uvec3(gl_FragCoord.xy, seed)).x);
+    float threshold = pixel_threshold(gl_FragCoord.xyz, seed);
     if (alpha_is_cut(v_material, alpha, threshold))
         discard;
 #endif

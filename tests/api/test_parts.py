@@ -366,7 +366,7 @@ class Parts(unittest.TestCase):
         command = [os.path.join(harness.BIN, "penumbra"), "render", self.scene, "--server",
                    "http://127.0.0.1:%d" % self.d.port, "--technique", "multisample", "--set",
                    "samples=256", "--set", "map_size=128", "--width", "64", "--height", "48",
-                   "--deadline-ms", "3600000", "--progressive", "-v", "-o"]
+                   "--deadline-ms", "3600000", "--exposure-ev", "3", "--progressive", "-v", "-o"]
         with self.d.paused():
             client = subprocess.Popen(command + [path], stderr=subprocess.PIPE)
             wait(lambda: self.running() == 1)
@@ -383,7 +383,7 @@ class Parts(unittest.TestCase):
         self.assertGreaterEqual(pictures, 2)
         for picture in seen:
             texts(picture)
-        plain = self.d.render(self.scene, REFINED, fresh=False).body
+        plain = self.d.render(self.scene, dict(REFINED, exposure_ev=3), fresh=False).body
         with open(path, "rb") as file:
             self.assertEqual(file.read(), plain)
         self.assertFalse(os.path.exists(path + ".part"))

@@ -365,7 +365,7 @@ static uint64_t picture_bytes(const struct pen_renderer *r, const struct pen_req
     if (!request->lights_given && scene)
         lights =
             scene->blob.light_count < PEN_MAX_LIGHTS ? scene->blob.light_count : PEN_MAX_LIGHTS;
-    return frame_output_estimate(request, lights, scene && scene->has_blend);
+    return frame_output_estimate(request, lights, scene && scene->may_blend);
 }
 
 static bool load_blobs(

@@ -56,7 +56,6 @@ static void upload_materials(struct scene *s)
 {
     uint32_t n = s->blob.material_count;
     struct material_record *records = pen_alloc_zero(n, sizeof *records);
-    s->has_emission = s->has_gloss = s->has_unlit = false;
     for (uint32_t i = 0; i < n; i++) {
         const struct psc_material *m = &s->blob.materials[i];
         struct material_record *r = &records[i];
@@ -76,12 +75,7 @@ static void upload_materials(struct scene *s)
             memcpy(r->transforms[2 * k], ref->transform, 12);
             memcpy(r->transforms[2 * k + 1], ref->transform + 3, 12);
         }
-        s->has_emission |= m->emissive[0] + m->emissive[1] + m->emissive[2] > 0;
-        bool gloss =
-            m->flags & PSC_SPECULAR_GLOSSINESS ? m->glossiness > 0.5f : m->roughness < 0.5f;
-        s->has_gloss |= gloss || m->surface.texture >= 0;
-        s->has_blend |= m->alpha_mode == PSC_BLEND;
-        s->has_unlit |= (m->flags & PSC_UNLIT) != 0;
+        s->may_blend |= m->alpha_mode == PSC_BLEND;
     }
     put_buffer(s, &s->materials, records, n * sizeof *records);
     free(records);
@@ -173,6 +167,21 @@ static const struct psc_material *material_of(const struct scene *s, uint32_t in
     return &s->blob.materials[s->blob.primitives[s->blob.instances[instance].primitive].material];
 }
 
+/* Of what is drawn: a material that no instance wears in this pose and variant costs nothing. */
+static void find_kinds(struct scene *s)
+{
+    s->has_emission = s->has_gloss = s->has_blend = s->has_unlit = false;
+    for (uint32_t i = 0; i < s->blob.instance_count; i++) {
+        const struct psc_material *m = material_of(s, i);
+        bool gloss =
+            m->flags & PSC_SPECULAR_GLOSSINESS ? m->glossiness > 0.5f : m->roughness < 0.5f;
+        s->has_emission |= m->emissive[0] + m->emissive[1] + m->emissive[2] > 0;
+        s->has_gloss |= gloss || m->surface.texture >= 0;
+        s->has_blend |= m->alpha_mode == PSC_BLEND;
+        s->has_unlit |= (m->flags & PSC_UNLIT) != 0;
+    }
+}
+
 static bool is_closed(const struct scene *s, uint32_t instance)
 {
     const struct psc_primitive *p = &s->blob.primitives[s->blob.instances[instance].primitive];
@@ -253,6 +262,7 @@ static struct scene *upload(struct scene *s, struct pen_error *error)
     s->depth_array = make_array(s, false);
     s->full_array = make_array(s, true);
     make_groups(s);
+    find_kinds(s);
     gl.CreateBuffers(1, &s->commands);
     scene_measure(s);
     if (gl.GetError() != GL_NO_ERROR) {
@@ -394,6 +404,7 @@ static void follow_pose(struct scene *s, uint32_t changes)
         make_groups(s);
     if (changes & POSE_MATERIALS)
         upload_materials(s);
+    find_kinds(s);
     scene_measure(s);
     s->moved += (changes & (POSE_VERTICES | POSE_INSTANCES)) != 0;
     s->remade += (changes & (POSE_STATE | POSE_ALPHA | POSE_SURFACES)) != 0;

@@ -58,6 +58,7 @@ struct scene {
     const struct scene_stage *stage; /* one of the two */
     bool has_emission, has_unlit;
     bool has_blend;
+    bool may_blend; /* in some variant */
     bool has_gloss; /* some roughness is below 0.5 */
     uint64_t bytes;
     uint64_t last_use;

@@ -451,12 +451,21 @@ struct http_listener *http_listener_create(
         {MHD_OPTION_END, 0, NULL},
     };
     struct MHD_OptionItem none[] = {{MHD_OPTION_END, 0, NULL}};
+    /* What it lets through is checked in on_request, with answers that say what is wrong. Since
+     * 0.9.77 the old option's -1 means "beyond the RFCs": "Content-Length : 2" would be a length. */
+#if MHD_VERSION >= 0x00097701
+    struct MHD_OptionItem discipline[] = {
+        {MHD_OPTION_CLIENT_DISCIPLINE_LVL, 1, NULL}, {MHD_OPTION_END, 0, NULL}};
+#else
+    struct MHD_OptionItem discipline[] = {
+        {MHD_OPTION_STRICT_FOR_CLIENT, -1, NULL}, {MHD_OPTION_END, 0, NULL}};
+#endif
     listener->daemon = MHD_start_daemon(flags, 0, NULL, NULL, on_request, listener,
         MHD_OPTION_EXTERNAL_LOGGER, no_log, NULL, MHD_OPTION_URI_LOG_CALLBACK, on_target, listener,
         MHD_OPTION_NOTIFY_COMPLETED, on_completed, listener, MHD_OPTION_NOTIFY_CONNECTION,
         on_connection, listener, MHD_OPTION_CONNECTION_LIMIT, limit,
         MHD_OPTION_CONNECTION_MEMORY_LIMIT, (size_t)CONNECTION_MEMORY,
-        MHD_OPTION_CONNECTION_TIMEOUT, 0u, MHD_OPTION_STRICT_FOR_CLIENT, -1, MHD_OPTION_ARRAY,
+        MHD_OPTION_CONNECTION_TIMEOUT, 0u, MHD_OPTION_ARRAY, discipline, MHD_OPTION_ARRAY,
         config->threads > 1 ? pool_options : none, MHD_OPTION_ARRAY, tls ? tls_options : none,
         MHD_OPTION_END);
     if (!listener->daemon) {

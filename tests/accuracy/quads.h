@@ -48,7 +48,7 @@ static inline void load_quads(
         add_quad(builder, &quads[i], unlit);
     memset(id, 0, PEN_ID_BYTES);
     number++;
-    memcpy(id, "quads", 5);
+    memcpy(id, "quads", sizeof "quads");
     memcpy(id + 8, &number, sizeof number);
     if (!psc_builder_finish(builder, id, &data, &bytes, &error))
         exit(1);

@@ -1,5 +1,6 @@
 """Requests that are wrong below HTTP's surface: ambiguous lengths, slow senders, broken uploads."""
 import json
+import re
 import socket
 import threading
 import time
@@ -31,9 +32,10 @@ class Framing(unittest.TestCase):
         """Exactly one answer, then the connection ends: nothing behind it was run."""
         got, closed = raw(self.d.port, request, timeout=3)
         self.assertTrue(got.startswith(b"HTTP/1.1 %d " % status), got[:200])
-        # libmicrohttpd 0.9.75 sends the header of its own refusals twice.
-        self.assertEqual(got.count(b"HTTP/1.1 "), 2 if by_library else 1, got)
-        self.assertEqual(got.count(b"HTTP/1.1 %d " % status), 2 if by_library else 1, got)
+        # libmicrohttpd 0.9.75 sends the header of its own refusals twice, 1.0 does not.
+        answers = len(re.findall(rb"HTTP/1\.1 \d\d\d ", got))
+        self.assertIn(answers, (1, 2) if by_library else (1,), got)
+        self.assertEqual(got.count(b"HTTP/1.1 %d " % status), answers, got)
         self.assertNotIn(b'"techniques"', got)
         self.assertTrue(closed)
         if b"problem+json" in got and not request.startswith(b"HEAD"):

@@ -100,6 +100,8 @@ struct technique_run {
      * error of vis.a here, by blending. */
     GLuint variance_framebuffer;
     /* What record tells the frame: */
+    uint32_t map_size; /* texels per side of the last map it looked at, fitted to all that casts; 0:
+                          finer ones follow the view, or it has none */
     const struct gl_texture *tiles; /* classes, of pass_classify; NULL: not classified */
     struct {
         uint32_t map_size;    /* of the map that proves it; 0: the method's answer stands */

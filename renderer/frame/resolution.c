@@ -32,13 +32,13 @@ static float texel_width(const struct technique_run *run, float z)
 {
     const struct light_face *face = run->face;
     float width = fmaxf(face->rect[2] - face->rect[0], face->rect[3] - face->rect[1]);
-    return width / (float)run->bound.map_size * (face->parallel ? 1 : z / face->near_z);
+    return width / (float)run->map_size * (face->parallel ? 1 : z / face->near_z);
 }
 
 bool frame_warn_of_resolution(const struct technique_run *run)
 {
     const struct light_face *face = run->face;
-    if (!run->bound.map_size || scene_is_empty(run->scene))
+    if (!run->map_size || scene_is_empty(run->scene))
         return false;
     float distance = focus_distance(run), at[3];
     float pixel = 2 * distance * tanf(0.5f * run->view->fov_y_rad) / (float)run->view->height;

@@ -397,6 +397,7 @@ static bool record(struct technique_run *run, struct pen_error *error)
         .margin_texels = (float)(params->kernel + 1) * MIN_MAX_SIZE / (float)params->map_size};
     if (!pass_classify(run, &classes, &r->tiles, error))
         return false;
+    run->map_size = params->map_size;
     for (uint32_t i = 0; i < LIGHT_TREE_POINTS; i++)
         r->points[i] = sample_point_at(
             run->face, (float)(i % LIGHT_TREE_SIDE) / 8 - 1, (float)(i / LIGHT_TREE_SIDE) / 8 - 1);

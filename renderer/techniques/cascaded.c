@@ -263,6 +263,7 @@ static bool record(struct technique_run *run, struct pen_error *error)
     const struct gl_texture *tiles;
     if (!pass_classify(run, &classes, &tiles, error))
         return false;
+    run->map_size = 0;
     const struct gl_target *sum = pass_sum(run);
     for (uint32_t i = 0; i < CASCADES; i++) {
         struct cascade *c = &((struct state *)run->state)->cascade;

@@ -72,7 +72,7 @@ static bool record(struct technique_run *run, struct pen_error *error)
     uint64_t bytes = (uint64_t)params->samples * params->map_size * params->map_size * 4;
     bool keep = bytes <= run->ctx->shadow_budget;
     const struct gl_target *sum = pass_sum(run);
-    run->bound.map_size = params->map_size;
+    run->map_size = run->bound.map_size = params->map_size;
     run->bound.texels = 2;
     for (uint32_t first = 0, n; first < params->samples; first += n) {
         uint32_t left = params->samples - first,

@@ -175,7 +175,7 @@ static bool record(struct technique_run *run, struct pen_error *error)
     uint32_t first = goes_on ? history_samples(run, params->samples) : run->frame * params->samples;
     uint64_t bytes = (uint64_t)params->samples * params->map_size * params->map_size * 4;
     bool keep = !goes_on && bytes * run->request->antialias <= run->ctx->shadow_budget;
-    run->bound.map_size = params->map_size;
+    run->map_size = run->bound.map_size = params->map_size;
     run->bound.texels = 2;
     run->bound.late = true;
     if (!add_samples(run, first, keep, sum, error))

@@ -41,6 +41,8 @@ int main(void)
     harness_scene(&(struct pen_generated_options){.kind = PEN_GENERATED_HALF_PLANE}, id);
     for (uint32_t i = 0; i < catalogue->count; i++) {
         const char *method = catalogue->items[i]->name;
+        if (!strcmp(method, "temporal")) /* a frame of its own has few samples */
+            method = "temporal&samples=16";
         if (is_exempt(method))
             continue;
         double right = error_of(method, id, &planar, SIDE, truth_half_plane);

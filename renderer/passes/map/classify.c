@@ -46,7 +46,7 @@ bool pass_classify(struct technique_run *run, const struct classify_desc *desc,
 {
     static const struct pass_targets key = {1};
     *tiles = NULL;
-    run->bound.map_size = desc->map_size;
+    run->map_size = run->bound.map_size = desc->map_size;
     run->bound.texels = desc->margin_texels, run->bound.pixels = desc->margin_pixels;
     run->bound.window = desc->bound;
     run->bound.late = desc->seams;

@@ -123,6 +123,7 @@ const struct shadow_input *pass_depth_map(
     struct technique_run *run, uint32_t size, struct pen_error *error)
 {
     struct shadow_key key = {.kind = "depth", .size = size};
+    run->map_size = size;
     return shadow_cache_get(run, &key, build_depth, error);
 }
 
@@ -130,5 +131,6 @@ const struct shadow_input *pass_caster_map(
     struct technique_run *run, uint32_t size, struct pen_error *error)
 {
     struct shadow_key key = {.kind = "depth", .size = size, .extra = {1}};
+    run->map_size = size;
     return shadow_cache_get(run, &key, build_depth, error);
 }

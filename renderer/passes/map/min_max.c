@@ -64,5 +64,6 @@ const struct shadow_input *pass_caster_min_max(
     struct technique_run *run, uint32_t size, struct pen_error *error)
 {
     struct shadow_key key = {.kind = "min-max", .size = size, .extra = {1}};
+    run->map_size = size;
     return shadow_cache_get(run, &key, build, error);
 }

@@ -19,7 +19,7 @@ static void die(const char *what, const struct pen_error *error)
 struct pen_renderer *harness_renderer(void)
 {
     struct pen_error error = {0};
-    struct pen_renderer_config config = {.device = {.debug = true}, .gpu_memory_bytes = 2ull << 30};
+    struct pen_renderer_config config = {.device = {.debug = true}, .gpu_memory_bytes = 4ull << 30};
     if (!renderer && !(renderer = pen_renderer_create(&config, &error))) {
         fprintf(stderr, "skipped: %s\n", error.message);
         exit(77);

@@ -1,13 +1,9 @@
-#include "renderer/passes/draw/screen.h"
 #include "renderer/passes/draw/show.h"
-#include "renderer/passes/light/sample_maps.h"
-#include "renderer/techniques/map_params.h"
+#include "renderer/techniques/sample_params.h"
 #include <string.h>
 
 #define MAX_SAMPLES 1024
 #define FIRST_MAPS 4 /* soon shown */
-
-static const char *const weighting_names[] = {"area", "g", NULL};
 
 struct multisample {
     uint32_t samples;
@@ -20,36 +16,9 @@ static const struct pen_param rows[] = {
     PARAM(struct multisample, samples, .def = 256, .min = 1, .max = MAX_SAMPLES,
         .help = "Points on the light, each with a shadow map of its own."),
     MAP_SIZE_ROW(struct multisample, 1024),
-    PARAM(struct multisample, weighting, .choices = weighting_names, .specialise = 1,
-        .help = "Mean over the light's area, or weighted by each point's irradiance."),
+    WEIGHTING_ROW(struct multisample),
     BIAS_ROW(struct multisample),
 };
-
-#define SHARED_ROWS "renderer/techniques/multisample.def"
-#include "renderer/shared/rows_c.h"
-
-static bool add_batch(struct technique_run *run, const struct sample_point *points, uint32_t first,
-    uint32_t count, bool keep, const struct gl_target *sum, struct pen_error *error)
-{
-    const struct multisample *params = run->params;
-    struct lookup_block block = {
-        .count = {(int32_t)count}, .weight = {1.0f / (float)params->samples}};
-    const struct gl_texture *maps;
-    if (!pass_sample_maps(
-            run, points + first, count, params->map_size, first, keep, block.samples, &maps, error))
-        return false;
-    struct pass_texture texture = {UNIT_SAMPLE_MAPS, maps->name, GL_SAMPLE_NEAREST_BORDER};
-    return pass_screen(run,
-        &(struct pass_screen){.name = "multisample lookup",
-            .body = "multisample.glsl",
-            .textures = &texture,
-            .texture_count = 1,
-            .framebuffer = sum->framebuffer,
-            .add = true,
-            .extra = &block,
-            .extra_bytes = sizeof block},
-        error);
-}
 
 static bool settle(struct technique_run *run, const struct gl_target *sum, struct pen_error *error)
 {
@@ -78,7 +47,9 @@ static bool record(struct technique_run *run, struct pen_error *error)
         uint32_t left = params->samples - first,
                  most = first ? SAMPLE_MAP_BATCH - first % SAMPLE_MAP_BATCH : FIRST_MAPS;
         n = left < most ? left : most;
-        if (!add_batch(run, points, first, n, keep, sum, error))
+        struct sample_batch batch = {"multisample lookup", points + first, n, params->map_size,
+            first, keep, params->samples};
+        if (!sample_batch_add(run, &batch, sum, error))
             return false;
         enum technique_step step = pass_step(run, first + n, params->samples);
         if (step == STEP_STOP)

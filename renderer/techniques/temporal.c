@@ -1,15 +1,11 @@
 #include "renderer/passes/draw/passes.h"
-#include "renderer/passes/draw/screen.h"
 #include "renderer/passes/draw/turn.h"
 #include "renderer/passes/filter/history.h"
-#include "renderer/passes/light/sample_maps.h"
-#include "renderer/techniques/map_params.h"
+#include "renderer/techniques/sample_params.h"
 #include <math.h>
 #include <string.h>
 
 #define MOST_WHEN_STILL (1u << 20) /* samples: beyond, a float's mean does not change any more */
-
-static const char *const weighting_names[] = {"area", "g", NULL};
 
 struct temporal {
     uint32_t samples;
@@ -24,8 +20,7 @@ static const struct pen_param rows[] = {
     PARAM(struct temporal, samples, .def = 4, .min = 1, .max = SAMPLE_MAP_BATCH,
         .help = "Points on the light that each frame adds, each with a shadow map of its own."),
     MAP_SIZE_ROW(struct temporal, 1024),
-    PARAM(struct temporal, weighting, .choices = weighting_names, .specialise = 1,
-        .help = "Mean over the light's area, or weighted by each point's irradiance."),
+    WEIGHTING_ROW(struct temporal),
     BIAS_ROW(struct temporal),
     PARAM(struct temporal, most, .def = 20, .min = 1, .max = 65536, .unit = "samples",
         .help = "How much the past counts at most while the camera moves; older frames fade. With "
@@ -42,8 +37,6 @@ static const struct pen_param rows[] = {
                 "0: any."),
 };
 
-#define SHARED_ROWS "renderer/techniques/multisample.def"
-#include "renderer/shared/rows_c.h"
 #define SHARED_ROWS "renderer/techniques/temporal.def"
 #include "renderer/shared/rows_c.h"
 
@@ -73,25 +66,11 @@ static bool add_samples(struct technique_run *run, uint32_t first, bool keep,
     const struct gl_target *sum, struct pen_error *error)
 {
     const struct temporal *params = run->params;
-    struct lookup_block block = {
-        .count = {(int32_t)params->samples}, .weight = {1.0f / (float)params->samples}};
     struct sample_point points[SAMPLE_MAP_BATCH];
-    const struct gl_texture *maps;
+    struct sample_batch batch = {
+        "temporal lookup", points, params->samples, params->map_size, first, keep, params->samples};
     sample_sequence(run->face, first, params->samples, points);
-    if (!pass_sample_maps(run, points, params->samples, params->map_size, first, keep,
-            block.samples, &maps, error))
-        return false;
-    struct pass_texture texture = {UNIT_SAMPLE_MAPS, maps->name, GL_SAMPLE_NEAREST_BORDER};
-    return pass_screen(run,
-        &(struct pass_screen){.name = "temporal lookup",
-            .body = "multisample.glsl",
-            .textures = &texture,
-            .texture_count = 1,
-            .framebuffer = sum->framebuffer,
-            .add = true,
-            .extra = &block,
-            .extra_bytes = sizeof block},
-        error);
+    return sample_batch_add(run, &batch, sum, error);
 }
 
 static bool join(struct technique_run *run, const struct gl_target *sum, struct pen_error *error)

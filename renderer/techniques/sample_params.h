@@ -1,0 +1,45 @@
+/* Rows and glue that the methods share which average the answers of maps seen from light samples. */
+#pragma once
+#include "renderer/passes/draw/screen.h"
+#include "renderer/passes/light/sample_maps.h"
+#include "renderer/techniques/map_params.h"
+
+static const char *const weighting_names[] = {"area", "g", NULL};
+
+#define WEIGHTING_ROW(aggregate)                                                                   \
+    PARAM(aggregate, weighting, .choices = weighting_names, .specialise = 1,                       \
+        .help = "Mean over the light's area, or weighted by each point's irradiance.")
+
+#define SHARED_ROWS "renderer/techniques/multisample.def"
+#include "renderer/shared/rows_c.h"
+
+struct sample_batch {
+    const char *name;                  /* of the pass */
+    const struct sample_point *points; /* [count] */
+    uint32_t count, map_size;
+    uint32_t number; /* as pass_sample_maps takes them */
+    bool keep;
+    uint32_t total; /* samples that the sum will be the mean of */
+};
+
+/* Adds what the receivers see of the batch's points to *sum, as shares of `total`. */
+static inline bool sample_batch_add(struct technique_run *run, const struct sample_batch *b,
+    const struct gl_target *sum, struct pen_error *error)
+{
+    struct lookup_block block = {.count = {(int32_t)b->count}, .weight = {1.0f / (float)b->total}};
+    const struct gl_texture *maps;
+    if (!pass_sample_maps(
+            run, b->points, b->count, b->map_size, b->number, b->keep, block.samples, &maps, error))
+        return false;
+    struct pass_texture texture = {UNIT_SAMPLE_MAPS, maps->name, GL_SAMPLE_NEAREST_BORDER};
+    return pass_screen(run,
+        &(struct pass_screen){.name = b->name,
+            .body = "multisample.glsl",
+            .textures = &texture,
+            .texture_count = 1,
+            .framebuffer = sum->framebuffer,
+            .add = true,
+            .extra = &block,
+            .extra_bytes = sizeof block},
+        error);
+}

@@ -51,6 +51,7 @@ static void write_progress(struct pen_json *json, const struct pen_progress *pro
     pen_json_uint(json, "picture", progress->number);
     pen_json_uint(json, "samples", progress->done);
     pen_json_uint(json, "of", progress->total);
+    pen_json_uint(json, "taken_over", progress->kept);
     if (progress->standard_error >= 0)
         pen_json_float(json, "standard_error", progress->standard_error);
     else

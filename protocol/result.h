@@ -56,6 +56,7 @@ struct pen_progress {
     uint32_t number;      /* of the render's pictures, from 0; the last one counts too */
     uint32_t done, total; /* light samples of a pixel, over jittered frames; a method that takes its
                              samples at once counts frames */
+    uint32_t kept;        /* of those done, that an earlier render had taken */
     float standard_error; /* of the mean visibility: root mean square over the picture; < 0: nobody
                              estimated it */
     float elapsed_ms;     /* since the renderer began with it */

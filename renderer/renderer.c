@@ -4,28 +4,13 @@
 #include "renderer/frame/output.h"
 #include "renderer/generate/generate.h"
 #include "renderer/gl/context.h"
+#include "renderer/passes/draw/kept_sums.h"
 #include "renderer/passes/filter/history.h"
 #include "renderer/passes/map/shadow_cache.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
-
-#define TECHNIQUE(name) extern const struct technique technique_##name;
-#include "renderer/techniques/registry.def"
-#undef TECHNIQUE
-const struct technique *const technique_registry[] = {
-#define TECHNIQUE(name) &technique_##name,
-#include "renderer/techniques/registry.def"
-#undef TECHNIQUE
-    NULL};
-
-#define TECHNIQUE(name) +1
-enum {
-    TECHNIQUE_COUNT = 0
-#include "renderer/techniques/registry.def"
-};
-#undef TECHNIQUE
 
 #define MAX_RESIDENT 256
 #define DEFAULT_BUDGET (2ull << 30)
@@ -52,17 +37,6 @@ struct pen_renderer {
     const struct pen_blobs *admitting; /* not evicted now */
 };
 
-const struct pen_catalogue *pen_renderer_catalogue(void)
-{
-    static const struct pen_technique_info *const infos[] = {
-#define TECHNIQUE(name) &technique_##name.info,
-#include "renderer/techniques/registry.def"
-#undef TECHNIQUE
-    };
-    static const struct pen_catalogue catalogue = {infos, TECHNIQUE_COUNT};
-    return &catalogue;
-}
-
 struct pen_renderer *pen_renderer_create(
     const struct pen_renderer_config *config, struct pen_error *error)
 {
@@ -80,6 +54,7 @@ struct pen_renderer *pen_renderer_create(
     r->ctx.shadows = shadow_cache_create();
     r->ctx.histories = history_store_create(
         r->budget / 4, config->session_idle_ms > 0 ? config->session_idle_ms : SESSION_IDLE_MS);
+    r->ctx.kept_sums = kept_sums_store_create(r->budget / 8);
     r->emissions = emission_cache_create();
     gl_samplers_init(&r->ctx.samplers);
     gl.CreateVertexArrays(1, &r->ctx.empty_array);
@@ -105,6 +80,7 @@ void pen_renderer_destroy(struct pen_renderer *r)
         scene_destroy(r->scenes[i]);
     shadow_cache_destroy(r->ctx.shadows);
     history_store_destroy(r->ctx.histories);
+    kept_sums_store_destroy(r->ctx.kept_sums);
     emission_cache_destroy(r->emissions);
     gl_samplers_finish(&r->ctx.samplers);
     gl_programs_destroy(r->ctx.programs);
@@ -138,7 +114,8 @@ static uint64_t scene_bytes(const struct pen_renderer *r)
 static uint64_t cached_bytes(const struct pen_renderer *r)
 {
     return scene_bytes(r) + shadow_cache_bytes(r->ctx.shadows) +
-           emission_cache_bytes(r->emissions) + history_store_bytes(r->ctx.histories);
+           emission_cache_bytes(r->emissions) + history_store_bytes(r->ctx.histories) +
+           kept_sums_store_bytes(r->ctx.kept_sums);
 }
 
 uint64_t pen_renderer_gpu_bytes(const struct pen_renderer *r)
@@ -191,6 +168,7 @@ static void remove_scene(struct pen_renderer *r, uint32_t i)
 {
     shadow_cache_drop_scene(r->ctx.shadows, r->scenes[i]);
     emission_cache_drop(r->emissions, r->scenes[i]->id);
+    kept_sums_store_drop(r->ctx.kept_sums, r->scenes[i]->id);
     scene_destroy(r->scenes[i]);
     r->scenes[i] = r->scenes[--r->scene_count];
 }
@@ -203,16 +181,20 @@ static bool is_any_busy(const struct pen_renderer *r)
     return false;
 }
 
-/* Frees something that can be made again, the cheapest first: targets that nobody draws into, shadow
- * inputs, sessions, emission textures, scenes. False: all that is left is in use. */
+/* Frees something that can be made again, the cheapest first: sums that somebody may ask more of,
+ * targets that nobody draws into, shadow inputs, sessions, emission textures, scenes. False: all that is left is in use. */
 static bool evict(struct pen_renderer *r, uint64_t bytes, const struct scene *keep)
 {
-    uint64_t before = shadow_cache_bytes(r->ctx.shadows), least = UINT64_MAX;
+    uint64_t least = UINT64_MAX, before = kept_sums_store_bytes(r->ctx.kept_sums);
+    kept_sums_store_trim(r->ctx.kept_sums, before > bytes ? before - bytes : 0);
+    if (kept_sums_store_bytes(r->ctx.kept_sums) < before)
+        return true;
     for (uint32_t i = 0; i < PEN_MAX_RENDERS; i++)
         if (!r->renders[i].lane.busy && r->renders[i].target_bytes) {
             lane_finish(&r->renders[i].lane);
             return true;
         }
+    before = shadow_cache_bytes(r->ctx.shadows);
     shadow_cache_trim(r->ctx.shadows, before > bytes ? before - bytes : 0);
     if (shadow_cache_bytes(r->ctx.shadows) < before)
         return true;
@@ -474,6 +456,16 @@ void pen_render_limit(struct pen_render *render, double budget_ms, double until_
     render->lane.job.until_ms = until_ms;
 }
 
+void pen_render_continue(struct pen_render *render)
+{
+    struct pen_renderer *r = render->renderer;
+    struct frame_job *job = &render->lane.job;
+    uint64_t claimed = claimed_bytes(r);
+    if (job->technique->keeps_sums)
+        job->sums = kept_sums_open(r->ctx.kept_sums, job->request, &job->technique->info,
+            claimed < r->budget ? r->budget - claimed : 0);
+}
+
 bool pen_render_advance(struct pen_render *render, double ms)
 {
     gl_targets_charge(&render->target_bytes);
@@ -507,6 +499,8 @@ bool pen_render_end(struct pen_render *render, struct pen_error *error)
     history_close(r->ctx.histories, lane->job.history, ok);
     history_store_trim(r->ctx.histories, UINT64_MAX);
     lane->job.history = NULL;
+    kept_sums_close(r->ctx.kept_sums, lane->job.sums);
+    lane->job.sums = NULL;
     shadow_cache_end_frame(&lane->ctx);
     uint64_t since = lane->programs_since;
     for (uint32_t i = 0; i < PEN_MAX_RENDERS; i++) {

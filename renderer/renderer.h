@@ -72,6 +72,9 @@ void pen_render_watch(struct pen_render *render, const struct pen_viewer *viewer
 /* Ends with the picture reached when it has had the renderer for so many ms, or at a time of the
  * monotonic clock (ms); 0: no limit. Before the first pen_render_advance. */
 void pen_render_limit(struct pen_render *render, double budget_ms, double until_ms);
+/* Takes over the samples that a render of the same request, but for their number, has left, and leaves
+ * its own as far as it gets. Before the first pen_render_advance. */
+void pen_render_continue(struct pen_render *render);
 /* Goes on for about so many ms, more where a piece cannot be cut. True when it has ended. */
 bool pen_render_advance(struct pen_render *render, double ms);
 struct pen_place pen_render_place(const struct pen_render *render);

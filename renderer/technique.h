@@ -18,6 +18,8 @@ struct passes;
 struct shadow_cache;
 struct history;
 struct history_store;
+struct kept_sums;
+struct kept_sums_store;
 
 /* A frame in progress gives way to others between two pieces of work (passes/draw/turn.h). */
 struct technique_turns {
@@ -40,11 +42,12 @@ struct technique_ctx {
     struct gl_programs *programs;
     struct gl_samplers samplers;
     struct gl_timer timer;
-    struct shadow_cache *shadows;    /* inputs that are kept between requests */
-    struct history_store *histories; /* of sequences of frames */
-    struct passes *passes;           /* what passes keep for themselves */
-    bool software;                   /* OpenGL runs on the CPU */
-    GLuint empty_array;              /* vertex array for passes that make their own vertices */
+    struct shadow_cache *shadows;      /* inputs that are kept between requests */
+    struct history_store *histories;   /* of sequences of frames */
+    struct kept_sums_store *kept_sums; /* of renders, for those that ask for more */
+    struct passes *passes;             /* what passes keep for themselves */
+    bool software;                     /* OpenGL runs on the CPU */
+    GLuint empty_array;                /* vertex array for passes that make their own vertices */
     /* Uniform buffers: UBO_VIEW, UBO_LIGHT and UBO_PARAMS. */
     GLuint view_block, light_block, param_block;
     GLuint counts;           /* STORAGE_COUNTS of the frame's method, or 0 */
@@ -96,6 +99,7 @@ struct technique_run {
     uint32_t light_index;              /* of the request */
     struct technique_watch *watch;     /* see passes/draw/show.h; NULL: nobody asks */
     struct history *history;           /* of the sequence that the request goes on with, or NULL */
+    struct kept_sums *sums;            /* see passes/draw/kept_sums.h; NULL: nothing is kept */
     /* R32F, or 0: nobody asks. A method that estimates its error adds the square of the standard
      * error of vis.a here, by blending. */
     GLuint variance_framebuffer;
@@ -118,6 +122,7 @@ struct technique {
      * horizon.glsl says; of the other methods pass_screen fades it. */
     bool counts_horizon;
     size_t state_size;
+    bool keeps_sums;      /* goes on with what a request for fewer `samples` has left */
     bool estimates_error; /* fills technique_run.variance_framebuffer */
     bool (*create)(struct technique_ctx *, void *state, struct pen_error *); /* optional */
     bool (*record)(struct technique_run *, struct pen_error *);

@@ -192,6 +192,7 @@ static bool record_face(
         .light_index = light,
         .watch = is_watchable(f, light, number) ? &f->watch : NULL,
         .history = f->sketching || !is_picture(f) ? NULL : job->history,
+        .sums = f->sketching || !is_picture(f) ? NULL : job->sums,
         .variance_framebuffer =
             f->data && !f->sketching && frame_layers_want_error(job->request, job->technique)
                 ? job->targets->variance.framebuffer
@@ -560,7 +561,7 @@ bool frame_render(const struct frame_job *job, struct pen_frame *frame, struct p
     fit_targets(&f);
     frame_layers_begin(job, result);
     f.watch = (struct technique_watch){on_step, on_show};
-    frame_progress_begin(&f.progress, job, f.light_count);
+    frame_progress_begin(&f.progress, job, f.light_count, faces - 1);
     bool enough = false;
     for (uint32_t i = 0; i < r->antialias && !enough; i++) {
         if (r->antialias > 1)

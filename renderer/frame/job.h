@@ -17,4 +17,5 @@ struct frame_job {
     struct pen_viewer viewer;   /* wants NULL: nobody watches */
     double budget_ms, until_ms; /* see pen_render_limit */
     struct history *history;    /* of the sequence that it goes on with, or NULL */
+    struct kept_sums *sums;     /* of what it goes on with, or NULL */
 };

@@ -1,5 +1,6 @@
 #include "renderer/frame/progress.h"
 #include "protocol/memory.h"
+#include "renderer/passes/draw/kept_sums.h"
 #include "renderer/passes/draw/screen.h"
 #include <math.h>
 #include <stdlib.h>
@@ -9,10 +10,15 @@
 
 #define LEAST_SHARE 0.03 /* of the render's time may go into estimates of its error */
 
-void frame_progress_begin(struct frame_progress *p, const struct frame_job *job, uint32_t lights)
+void frame_progress_begin(
+    struct frame_progress *p, const struct frame_job *job, uint32_t lights, uint32_t faces)
 {
-    *p = (struct frame_progress){
-        .job = job, .lights = lights, .begun_ms = gl_now_ms(), .standard_error = -1, .total = 1};
+    *p = (struct frame_progress){.job = job,
+        .lights = lights,
+        .faces = faces,
+        .begun_ms = gl_now_ms(),
+        .standard_error = -1,
+        .total = 1};
     p->tracked = frame_progress_is_limited(p) ||
                  (job->viewer.wants && job->viewer.wants(job->viewer.context));
 }
@@ -191,6 +197,7 @@ void frame_progress_tell(struct frame_progress *p, struct pen_result *result)
     result->progress = (struct pen_progress){.number = p->shown++,
         .done = p->frames * p->total + p->done,
         .total = total,
+        .kept = p->faces ? (uint32_t)(kept_sums_taken(p->job->sums) / p->faces) : 0,
         /* Lights of unlike numbers of samples: what moves least may be what is farthest off. */
         .standard_error = p->units ? -1 : p->standard_error,
         .elapsed_ms = (float)(gl_now_ms() - p->begun_ms)};

@@ -5,7 +5,7 @@
 
 struct frame_progress {
     const struct frame_job *job;
-    uint32_t lights;
+    uint32_t lights, faces;   /* of all lights together */
     bool tracked;             /* estimates of its error are wanted */
     bool stopped;             /* before the last sample */
     bool begun;               /* there is an estimate */
@@ -27,7 +27,8 @@ struct frame_progress {
     bool show_wanted;
 };
 
-void frame_progress_begin(struct frame_progress *p, const struct frame_job *job, uint32_t lights);
+void frame_progress_begin(
+    struct frame_progress *p, const struct frame_job *job, uint32_t lights, uint32_t faces);
 /* Somebody may want what is not complete. */
 bool frame_progress_is_limited(const struct frame_progress *p);
 /* Of each of so many lights or faces of one there are a few samples. */

@@ -77,7 +77,9 @@ uint64_t gl_targets_bytes(void)
     return all_bytes;
 }
 
-void gl_targets_charge(uint64_t *account)
+uint64_t *gl_targets_charge(uint64_t *account)
 {
+    uint64_t *before = charged;
     charged = account ? account : &nobodys;
+    return before;
 }

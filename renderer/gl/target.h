@@ -25,5 +25,6 @@ void gl_target_clear(const struct gl_target *target, const float value[4]);
 
 /* What all targets of the process hold. On the GL thread, as all of OpenGL. */
 uint64_t gl_targets_bytes(void);
-/* From now on the bytes of new targets are in *account too, which outlives them; NULL: in none. */
-void gl_targets_charge(uint64_t *account);
+/* From now on the bytes of new targets are in *account too, which outlives them; NULL: in none.
+ * Returns what was there before. */
+uint64_t *gl_targets_charge(uint64_t *account);

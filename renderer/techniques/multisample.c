@@ -1,3 +1,4 @@
+#include "renderer/passes/draw/kept_sums.h"
 #include "renderer/passes/draw/show.h"
 #include "renderer/techniques/sample_params.h"
 #include <string.h>
@@ -31,6 +32,25 @@ static bool settle(struct technique_run *run, const struct gl_target *sum, struc
         error);
 }
 
+static bool look_up(struct technique_run *run, const struct gl_target *sum, uint32_t done,
+    bool *enough, struct pen_error *error)
+{
+    enum technique_step step =
+        pass_step(run, done, ((const struct multisample *)run->params)->samples);
+    *enough = step == STEP_STOP;
+    return step != STEP_SHOW || (settle(run, sum, error) && pass_show(run, error));
+}
+
+/* More samples would come in whole batches: what is less goes into a copy. The order of additions,
+ * and so the picture, is then the same whoever took the samples before. */
+static const struct gl_target *copy_sum(struct technique_run *run, const struct gl_target *from)
+{
+    const struct gl_target *to = pass_sum(run);
+    gl.CopyImageSubData(from->texture.name, GL_TEXTURE_2D, 0, 0, 0, 0, to->texture.name,
+        GL_TEXTURE_2D, 0, 0, 0, 0, (GLsizei)run->width, (GLsizei)run->height, 1);
+    return to;
+}
+
 static bool record(struct technique_run *run, struct pen_error *error)
 {
     const struct multisample *params = run->params;
@@ -40,21 +60,34 @@ static bool record(struct technique_run *run, struct pen_error *error)
         points[0] = sample_point_at(run->face, 0, 0);
     uint64_t bytes = (uint64_t)params->samples * params->map_size * params->map_size * 4;
     bool keep = bytes <= run->ctx->shadow_budget;
-    const struct gl_target *sum = pass_sum(run);
+    struct kept_sum *kept =
+        kept_sum_open(run, params->samples, 1, (uint64_t)KEPT_SUM_BYTES * run->width * run->height);
+    const struct gl_target *sum = kept ? kept_sum_target(run, kept) : pass_sum(run);
+    uint32_t done = kept ? kept->samples : 0;
+    bool enough = false;
+    run->result->shadow_maps += done;
     run->map_size = run->bound.map_size = params->map_size;
     run->bound.texels = 2;
-    for (uint32_t first = 0, n; first < params->samples; first += n) {
-        uint32_t left = params->samples - first,
-                 most = first ? SAMPLE_MAP_BATCH - first % SAMPLE_MAP_BATCH : FIRST_MAPS;
-        n = left < most ? left : most;
-        struct sample_batch batch = {"multisample lookup", points + first, n, params->map_size,
-            first, keep, params->samples};
+    if (done && !look_up(run, sum, done, &enough, error))
+        return false;
+    while (done < params->samples && !enough) {
+        uint32_t left = params->samples - done,
+                 most = done ? SAMPLE_MAP_BATCH - done % SAMPLE_MAP_BATCH : FIRST_MAPS;
+        uint32_t n = left < most ? left : most;
+        if (kept && n < most) {
+            sum = copy_sum(run, sum);
+            kept = NULL;
+        }
+        struct sample_batch batch = {
+            "multisample lookup", points + done, n, params->map_size, done, keep, 1};
+        if (kept)
+            kept->samples = 0;
         if (!sample_batch_add(run, &batch, sum, error))
             return false;
-        enum technique_step step = pass_step(run, first + n, params->samples);
-        if (step == STEP_STOP)
-            break;
-        if (step == STEP_SHOW && !(settle(run, sum, error) && pass_show(run, error)))
+        done += n;
+        if (kept)
+            kept->samples = done;
+        if (!look_up(run, sum, done, &enough, error))
             return false;
     }
     return settle(run, sum, error);
@@ -75,5 +108,6 @@ const struct technique technique_multisample = {
         .struct_size = sizeof(struct multisample),
         .params = {rows, sizeof rows / sizeof *rows}},
     .counts_horizon = true,
+    .keeps_sums = true,
     .record = record,
 };

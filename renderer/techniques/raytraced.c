@@ -137,6 +137,7 @@ const struct technique technique_raytraced = {
         .struct_size = sizeof(struct raytraced),
         .params = {rows, sizeof rows / sizeof *rows}},
     .counts_horizon = true,
+    .keeps_sums = true,
     .state_size = sizeof(struct state),
     .estimates_error = true,
     .record = record,

@@ -19,7 +19,7 @@ struct sample_batch {
     uint32_t count, map_size;
     uint32_t number; /* as pass_sample_maps takes them */
     bool keep;
-    uint32_t total; /* samples that the sum will be the mean of */
+    uint32_t total; /* samples that the sum will be the mean of; 1: it is a sum */
 };
 
 /* Adds what the receivers see of the batch's points to *sum, as shares of `total`. */

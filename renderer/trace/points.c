@@ -2,8 +2,6 @@
 #include "renderer/trace/points.h"
 #include <stdlib.h>
 
-#define FIRST_BLOCK 64u
-
 static uint32_t log2_floor(uint32_t x)
 {
     return 31 - (uint32_t)__builtin_clz(x);
@@ -28,7 +26,7 @@ bool trace_points_make(
 {
     uint32_t net = samples, rim = net + TRACE_PRETEST_NET, total = rim + TRACE_PRETEST_RIM;
     uint32_t *xs = malloc(2 * (size_t)total * sizeof *xs), *ys = xs ? xs + total : NULL;
-    uint32_t block = samples > FIRST_BLOCK ? FIRST_BLOCK : samples;
+    uint32_t block = samples > TRACE_FIRST_BLOCK ? TRACE_FIRST_BLOCK : samples;
     uint32_t early = TRACE_PRETEST_FIRST, late = TRACE_PRETEST_NET - early;
     uint32_t salt = trace_hash(seed + 1);
     if (!xs)

@@ -7,6 +7,7 @@
 
 #define TRACE_MAX_SAMPLES 65536u
 #define TRACE_MAX_BLOCKS 16
+#define TRACE_FIRST_BLOCK 64u /* samples */
 #define TRACE_STOP_AFTER 256u /* samples before a receiver may stop early */
 #define TRACE_PRETEST_NET 16u
 #define TRACE_PRETEST_FIRST 4u /* of them a net, too, and the first */

@@ -64,6 +64,14 @@ enum pen_trace_weighting {
     PEN_TRACE_G,    /* weighted by cos(receiver) cos(light) / distance^2 */
 };
 
+/* What the receivers of a job have gathered, for one that is the same but for its number of samples.
+ * Only those of at least 64 samples and without target_error leave anything. */
+struct pen_trace_kept;
+uint32_t pen_trace_kept_samples(const struct pen_trace_kept *kept); /* NULL: 0 */
+/* `plain`: weighted by area, without an emission texture. */
+uint64_t pen_trace_kept_bytes(size_t receivers, bool plain);
+void pen_trace_kept_destroy(struct pen_trace_kept *kept); /* NULL is fine */
+
 enum pen_trace_step { PEN_TRACE_GO_ON, PEN_TRACE_SHOW, PEN_TRACE_STOP };
 
 /* Receivers, and how they are sampled. Receivers are in rows: neighbours in the image should be
@@ -90,6 +98,9 @@ struct pen_trace_job {
     float eye[3];
     float depth_error, aim_error;
     uint32_t seed;
+    /* Where what is there already is taken from, if it is not of more samples than these, and what
+     * there is in the end is left, complete or stopped; NULL there: nothing. NULL: not wanted. */
+    struct pen_trace_kept **kept;
     uint32_t threads;     /* 0: as many as this process may run on */
     uint64_t deadline_ns; /* CLOCK_MONOTONIC; 0: none */
     /* Called on the caller's thread while nobody traces, whenever about turn_ms have passed. False:

@@ -221,6 +221,7 @@ static void set_up(struct render *render, const struct pen_request *request,
     render->request = *request;
     render->batch = request->delivery.priority == PEN_PRIORITY_BATCH;
     render->measure = waiter->measure;
+    render->fresh = waiter->fresh;
     snprintf(render->request_id, sizeof render->request_id, "%s",
         waiter->request_id ? waiter->request_id : "");
     render->estimate = estimate;
@@ -472,7 +473,8 @@ void scheduler_finish(struct scheduler *s, struct render *render, const struct o
     bool ok = answer.error.code == PEN_OK, given_up = answer.error.code == PEN_LOST;
     if (ok)
         s->mean_ms += 0.1 * (ms - s->mean_ms);
-    if (ok || given_up)
+    /* What was there already cost nothing. */
+    if ((ok || given_up) && !(outcome->result && outcome->result->progress.kept))
         estimates_learn(s->estimates, &render->request, ms / picture_share(outcome->result), ok,
             s->limits.now_ns());
     settle(s, render, ms);

@@ -29,7 +29,8 @@ struct waiter {
     const char *request_id;                 /* for the log; NULL: none; copied */
     bool (*is_gone)(struct waiter *waiter); /* the client has hung up; may be NULL */
     void (*finish)(struct waiter *waiter, const struct outcome *outcome);
-    bool best; /* at the deadline a worker that has begun with it gives what there is */
+    bool fresh; /* nothing that is there of its picture already is used */
+    bool best;  /* at the deadline a worker that has begun with it gives what there is */
     /* A picture so far, borrowed for the call, when one is wanted; before `finish`, from any thread,
      * with no lock held. NULL: only the end matters. */
     void (*part)(struct waiter *waiter, struct picture *picture);
@@ -47,7 +48,7 @@ struct render {
     uint64_t queued_ns, taken_ns;
     uint64_t last_deadline_ns;
     uint64_t best_until_ns; /* of a waiter who takes what there is; 0: there is none */
-    bool shareable, running, batch;
+    bool shareable, running, batch, fresh;
     uint32_t measure;
     int reference_fd;         /* the render's own; 0: none */
     uint32_t attempts, kills; /* kept by the worker pool */

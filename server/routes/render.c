@@ -209,7 +209,7 @@ static void ended(struct call *call, const struct outcome *outcome)
         return;
     work->picture = picture_reference(outcome->picture);
     note_times(call, &work->picture->result);
-    if (*work->choice.why)
+    if (*work->choice.why && !work->picture->result.progress.kept)
         auto_runs_observe(call->service->auto_runs, &work->choice, outcome->run_ms);
 }
 
@@ -239,6 +239,7 @@ static enum step_end queue(struct call *call, struct pen_error *error)
     work->waiter = (struct waiter){.client = call->client,
         .request_id = call->exchange->request_id,
         .deadline_ns = call->exchange->body_ns + work->request.delivery.deadline_ms * CLOCK_MS,
+        .fresh = wants_fresh(call),
         .best = work->request.delivery.on_deadline == PEN_DEADLINE_BEST,
         .is_gone = is_gone,
         .finish = finish};

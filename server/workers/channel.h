@@ -5,7 +5,7 @@
 #include "server/queue/measure.h"
 #include <stddef.h>
 
-#define CHANNEL_VERSION 6u
+#define CHANNEL_VERSION 7u
 #define CHANNEL_MAX_JOBS 8  /* that a worker has at a time, being encoded or not */
 #define CHANNEL_WORKER_FD 3 /* the worker's end */
 #define CHANNEL_MAX_FDS (2 + PEN_MAX_LIGHTS)
@@ -53,7 +53,7 @@ struct channel_job {
     uint32_t image_count;
     uint32_t measure; /* enum measure */
     uint32_t parts;   /* 1: as if a CHANNEL_WANT followed */
-    uint32_t reserved;
+    uint32_t fresh;   /* 1: drawn from its first sample on, whatever there is already */
     uint8_t images[PEN_MAX_LIGHTS][PEN_ID_BYTES]; /* in the order of the descriptors */
 };
 #define CHANNEL_MAX_RESIDENT 128 /* the ones used last, if there are more */

@@ -93,6 +93,7 @@ static struct worker_item *make_item(const struct channel_message *message)
     item->output = job->request.output;
     item->measure = job->measure;
     item->reference_fd = -1;
+    item->fresh = job->fresh != 0;
     item->part_wanted = job->parts != 0;
     item->best_until_ns = job->best_until_ns;
     return item;

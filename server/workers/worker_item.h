@@ -14,6 +14,7 @@ struct worker_item { /* allocated by the caller, freed by the encoder */
     float load_ms;
     bool was_resident;
     uint64_t best_until_ns; /* monotonic: what there is then is wanted; 0: the whole picture is */
+    bool fresh;             /* see channel_job */
     bool part_wanted;       /* a picture so far would be taken */
 };
 

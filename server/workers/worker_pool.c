@@ -179,6 +179,7 @@ static bool dispatch(struct slot *slot, struct flight *flight, struct render *re
     flight->since_ns = clock_now_ns();
     message.job_data.request = render->request;
     message.job_data.measure = render->measure;
+    message.job_data.fresh = render->fresh;
     message.job_data.client = render->payer;
     message.job_data.best_until_ns = render->best_until_ns;
     struct pen_delivery *delivery = &message.job_data.request.delivery;

@@ -107,6 +107,8 @@ bool worker_turns_begin(struct worker_turns *t, const struct pen_request *reques
     if (item->measure == MEASURE_PICTURE)
         pen_render_limit(
             render, request->delivery.budget_ms, (double)item->best_until_ns / CLOCK_MS);
+    if (item->measure == MEASURE_PICTURE && !item->fresh)
+        pen_render_continue(render);
     *turn = (struct turn){.turns = t,
         .render = render,
         .item = item,

@@ -6,7 +6,7 @@ file(READ ${registry} lines)
 file(CONFIGURE OUTPUT ${shadow}/renderer/techniques/registry.def
     CONTENT "${lines}TECHNIQUE(dimmed)\n" @ONLY)
 penumbra_shader_sources(${shadow}/gl_sources.c ${PENUMBRA_SHADERS} ${extra}/dimmed.glsl)
-add_library(penumbra_extended OBJECT ${CMAKE_SOURCE_DIR}/renderer/renderer.c ${extra}/dimmed.c
+add_library(penumbra_extended OBJECT ${CMAKE_SOURCE_DIR}/renderer/registry.c ${extra}/dimmed.c
     ${shadow}/gl_sources.c)
 target_include_directories(penumbra_extended BEFORE PRIVATE ${shadow})
 target_link_libraries(penumbra_extended PUBLIC penumbra_accuracy)

@@ -94,6 +94,28 @@ class Early(unittest.TestCase):
         again = self.d.render(self.scene, dict(request, budget_ms=1), fresh=False)
         self.assertEqual(again.body, full.body)
 
+    def test_is_gone_on_with(self):
+        """More samples of what was drawn before are added to it, and nobody sees a difference."""
+        def maps(samples, **more):
+            return dict(SIZE, technique={"name": "multisample", "params": {"samples": samples}},
+                        camera={"orbit": {"azimuth_deg": 77}}, **more)
+        self.assertEqual(self.record(maps(16), fresh=False)["progress"]["taken_over"], 0)
+        other = self.d.upload(harness.grid_scene(name="between"))
+        self.d.render(other, maps(16), fresh=False)
+        more = self.record(maps(64), fresh=False)
+        self.assertEqual(more["progress"]["taken_over"], 16)
+        self.assertEqual(more["shadow_maps"], 64)
+        afresh = self.d.render(self.scene, maps(64))
+        kept = self.d.get(more["image"]["href"])
+        self.assertEqual(kept.body, afresh.body)
+        # Who wants a new picture gets one.
+        self.assertEqual(self.record(maps(64))["progress"]["taken_over"], 0)
+        # Where the time ends is where the next one begins.
+        early = self.record(maps(256, budget_ms=1), fresh=False)["progress"]
+        late = self.record(maps(256), fresh=False)["progress"]
+        self.assertEqual(early["taken_over"], 64)
+        self.assertEqual(late["taken_over"], early["samples"])
+
     def test_deadline(self):
         """The endless one has a picture long before, and no end."""
         late = dict(ENDLESS, deadline_ms=int(4000 * PATIENCE), on_deadline="best")

@@ -72,6 +72,7 @@ FLOORS = {
         ["frame"],
         ["lane"],
         ["renderer"],
+        ["registry"],
         ["catalogue"]],
 }
 MOST_FILES = 20  # directly in a folder of the trees that have floors

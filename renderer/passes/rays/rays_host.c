@@ -1,9 +1,11 @@
 /* Rays on the CPU: read the receivers back, trace, upload. */
 #include "protocol/container.h"
 #include "protocol/memory.h"
+#include "renderer/passes/draw/kept_sums.h"
 #include "renderer/passes/draw/show.h"
 #include "renderer/passes/draw/turn.h"
 #include "renderer/passes/rays/rays.h"
+#include "renderer/trace/points.h"
 #include <stdlib.h>
 #include <string.h>
 
@@ -113,6 +115,25 @@ static bool show(void *context)
     return ok;
 }
 
+static void destroy_kept(void *kept)
+{
+    pen_trace_kept_destroy(kept);
+}
+
+/* One light's, for all of its faces. */
+static struct kept_sum *open_kept(struct technique_run *run, const struct ray_job *job)
+{
+    bool plain = job->weighting == PEN_TRACE_AREA && !run->face->textured;
+    uint64_t bytes = pen_trace_kept_bytes((size_t)run->width * run->height, plain);
+    struct kept_sum *kept =
+        kept_sum_open(run, trace_points_round(job->samples), run->light->face_count, bytes);
+    if (kept) {
+        kept->bytes = bytes;
+        kept->destroy = destroy_kept;
+    }
+    return kept;
+}
+
 bool pass_rays_host(struct technique_run *run, const struct ray_job *job, struct ray_targets *t,
     struct pen_error *error)
 {
@@ -151,11 +172,22 @@ bool pass_rays_host(struct technique_run *run, const struct ray_job *job, struct
         trace.turn_ms = run->ctx->turns.most_ms;
     }
     struct pen_trace_stats stats;
+    struct kept_sum *kept = open_kept(run, job);
+    struct pen_trace_kept *gathered = kept ? kept->own : NULL;
+    if (kept) { /* it is the job's now */
+        kept->own = NULL;
+        kept->samples = 0;
+        trace.kept = &gathered;
+    }
     read_texture(&t->receivers[0].texture, positions);
     read_texture(&t->receivers[1].texture, normals);
     gl_timer_begin(&run->ctx->timer, PEN_STAGE_TECHNIQUE, "trace");
     bool ok = pen_trace_visibility(scene, &light, &trace, &result, &stats, error);
     gl_timer_end(&run->ctx->timer);
+    if (kept) {
+        kept->own = gathered;
+        kept->samples = pen_trace_kept_samples(gathered);
+    }
     if (ok) {
         write_result(&waiting);
         run->result->rays += stats.rays;

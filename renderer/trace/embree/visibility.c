@@ -1,4 +1,5 @@
 /* A job over an image of receivers: tiles, the pre-test, and when to stop. */
+#include "renderer/trace/embree/kept.h"
 #include "renderer/trace/embree/packet.h"
 #include "renderer/trace/embree/verdicts.h"
 #include <math.h>
@@ -7,16 +8,7 @@
 
 #define TILE 16 /* receivers along an edge; a multiple of 4 */
 #define TILE_RECEIVERS (TILE * TILE)
-#define FIRST_TILES 4           /* of each thread, before their speed is known */
-#define SUMS_BYTES (512u << 20) /* of those that are kept from block to block */
-
-struct kept_count {
-    uint32_t count;
-    float pairs;
-};
-struct kept_sums {
-    double weight, visible, rgb[3];
-};
+#define FIRST_TILES 4 /* of each thread, before their speed is known */
 
 struct run {
     const struct pen_trace_scene *scene;
@@ -27,16 +19,13 @@ struct run {
     uint32_t mode; /* enum trace_mode */
     uint32_t samples, position_stride, normal_stride;
     struct trace_points points;
-    uint8_t *verdicts; /* adaptive: enum verdict per receiver */
-    uint8_t *full;     /* adaptive: 1 where all samples are wanted */
-    uint8_t *early;    /* adaptive, in steps: of the pre-test's first points those that were seen */
-    /* In steps, after the blocks before the one at hand: one per receiver, or NULL: a tile takes all
-     * its blocks at once. */
-    struct kept_count *counts;
-    struct kept_sums *sums; /* NULL: nothing is weighted or coloured */
-    uint32_t block;         /* at hand */
-    uint32_t taken;         /* samples before it, or of the pre-test while there are no sums */
-    bool enough;            /* there are no more wanted */
+    /* After the blocks before the one at hand; without counts a tile takes all its blocks at once. */
+    struct pen_trace_kept kept;
+    uint8_t *early; /* adaptive, in steps: of the pre-test's first points those that were seen */
+    uint32_t block; /* at hand */
+    uint32_t taken; /* samples before it, or of the pre-test while there are no sums */
+    bool enough;    /* there are no more wanted */
+    bool keeps;     /* for another job */
     uint32_t tiles_x, tile_width, tile_height;
     uint32_t tiles, first_tile; /* of all, and of the piece at hand */
     _Atomic uint64_t rays, receivers, full_receivers;
@@ -112,14 +101,8 @@ static void store(const struct run *run, uint32_t pixel, const float rgb[3], flo
         run->result->samples[pixel] = samples;
 }
 
-/* What one receiver has gathered over its blocks. */
-struct total {
-    uint32_t samples, count;
-    double weight, visible, rgb[3], pairs;
-};
-
-static void add_sums(
-    const struct run *run, struct total *t, const struct trace_sums *sums, int lane, uint32_t n)
+static void add_sums(const struct run *run, struct trace_total *t, const struct trace_sums *sums,
+    int lane, uint32_t n)
 {
     bool weights = run->mode & TRACE_WEIGHTS, colour = run->mode & TRACE_COLOUR;
     t->samples += n;
@@ -134,14 +117,14 @@ static void add_sums(
 }
 
 /* Standard error of the mean: see pen_trace_result. */
-static float error_of(const struct total *t)
+static float error_of(const struct trace_total *t)
 {
     if (t->samples == 1 || !(t->weight > 0))
         return 0;
     return (float)(sqrt(t->pairs) / t->weight);
 }
 
-static void finish(const struct run *run, uint32_t pixel, const struct total *t, bool traced)
+static void finish(const struct run *run, uint32_t pixel, const struct trace_total *t, bool traced)
 {
     float rgb[3] = {0}, visible = 0;
     if (t->weight > 0) {
@@ -159,7 +142,7 @@ static void finish(const struct run *run, uint32_t pixel, const struct total *t,
 
 /* Adds one block to the totals of the listed receivers. */
 static void add_block(struct run *run, uint32_t b, const struct trace_receiver *receivers,
-    uint32_t count, uint32_t extra_mode, struct total *totals)
+    uint32_t count, uint32_t extra_mode, struct trace_total *totals)
 {
     const struct trace_block *block = &run->points.blocks[b];
     struct trace_packet packet;
@@ -177,7 +160,7 @@ static void add_block(struct run *run, uint32_t b, const struct trace_receiver *
     atomic_fetch_add(&run->rays, rays);
 }
 
-static bool is_done(const struct run *run, uint32_t b, const struct total *t)
+static bool is_done(const struct run *run, uint32_t b, const struct trace_total *t)
 {
     return b + 1 == run->points.block_count ||
            (t->samples >= TRACE_STOP_AFTER && error_of(t) < run->job->target_error);
@@ -187,7 +170,7 @@ static bool is_done(const struct run *run, uint32_t b, const struct total *t)
 static void sample_receivers(
     struct run *run, struct trace_receiver *receivers, uint32_t count, uint32_t extra_mode)
 {
-    struct total totals[TILE_RECEIVERS] = {0};
+    struct trace_total totals[TILE_RECEIVERS] = {0};
     for (uint32_t b = 0; b < run->points.block_count && count; b++) {
         add_block(run, b, receivers, count, extra_mode, totals);
         uint32_t kept = 0;
@@ -203,47 +186,27 @@ static void sample_receivers(
     }
 }
 
-/* What a receiver has gathered in the blocks before. */
-static struct total recall(const struct run *run, uint32_t pixel, uint32_t samples)
-{
-    const struct kept_count *k = &run->counts[pixel];
-    const struct kept_sums *s = run->sums ? &run->sums[pixel] : NULL;
-    struct total t = {.samples = samples, .count = k->count, .pairs = (double)k->pairs};
-    t.weight = s ? s->weight : samples;
-    t.visible = s ? s->visible : k->count;
-    for (int c = 0; c < 3; c++)
-        t.rgb[c] = s ? s->rgb[c] : k->count;
-    return t;
-}
-
-static void keep(struct run *run, uint32_t pixel, const struct total *t)
-{
-    run->counts[pixel] = (struct kept_count){t->count, (float)t->pairs};
-    if (run->sums)
-        run->sums[pixel] =
-            (struct kept_sums){t->weight, t->visible, {t->rgb[0], t->rgb[1], t->rgb[2]}};
-}
-
-#define DONE (-1.0f) /* for `pairs` */
-
 /* The block at hand for those of a tile that are not done. */
 static void sample_block(struct run *run, struct trace_receiver *receivers, uint32_t count)
 {
-    struct total totals[TILE_RECEIVERS];
+    struct trace_total totals[TILE_RECEIVERS];
     uint32_t left = 0;
     for (uint32_t i = 0; i < count; i++)
-        if (run->counts[receivers[i].pixel].pairs != DONE) {
-            totals[left] = recall(run, receivers[i].pixel, run->taken);
+        if (run->kept.counts[receivers[i].pixel].pairs != TRACE_DONE) {
+            totals[left] = trace_kept_recall(&run->kept, receivers[i].pixel, run->taken);
             receivers[left++] = receivers[i];
         }
     add_block(run, run->block, receivers, left, 0, totals);
     for (uint32_t i = 0; i < left; i++) {
         uint32_t pixel = receivers[i].pixel;
-        keep(run, pixel, &totals[i]);
-        if (is_done(run, run->block, &totals[i])) {
-            finish(run, pixel, &totals[i], true);
-            run->counts[pixel].pairs = DONE;
-        }
+        trace_kept_put(&run->kept, pixel, &totals[i]);
+        if (!is_done(run, run->block, &totals[i]))
+            continue;
+        /* As rounded as it would be for a job that goes on from there. */
+        struct trace_total t = trace_kept_recall(&run->kept, pixel, totals[i].samples);
+        finish(run, pixel, &t, true);
+        if (run->block + 1 < run->points.block_count)
+            run->kept.counts[pixel].pairs = TRACE_DONE;
     }
 }
 
@@ -252,14 +215,14 @@ static void estimate_tile(void *context, uint32_t item)
 {
     struct run *run = context;
     struct trace_receiver receivers[TILE_RECEIVERS];
-    uint32_t count = gather(run, tile_of(run, item), run->full, receivers);
+    uint32_t count = gather(run, tile_of(run, item), run->kept.full, receivers);
     for (uint32_t i = 0; i < count; i++) {
         uint32_t pixel = receivers[i].pixel;
-        struct total t = {.samples = run->taken, .weight = run->taken};
-        if (run->counts && run->counts[pixel].pairs == DONE)
+        struct trace_total t = {.samples = run->taken, .weight = run->taken};
+        if (run->kept.counts && run->kept.counts[pixel].pairs == TRACE_DONE)
             continue;
-        if (run->counts) {
-            t = recall(run, pixel, run->taken);
+        if (run->kept.counts) {
+            t = trace_kept_recall(&run->kept, pixel, run->taken);
         } else {
             t.count = run->early[pixel];
             t.visible = t.rgb[0] = t.rgb[1] = t.rgb[2] = t.count;
@@ -283,31 +246,34 @@ static void sample_tile(void *context, uint32_t item)
     struct trace_receiver receivers[TILE_RECEIVERS];
     if (is_late(run))
         return;
-    uint32_t count = gather(run, tile_of(run, item), run->full, receivers);
+    uint32_t count = gather(run, tile_of(run, item), run->kept.full, receivers);
     if (run->block == 0)
         atomic_fetch_add(&run->full_receivers, count);
-    if (run->counts)
+    if (run->kept.counts)
         sample_block(run, receivers, count);
     else
         sample_receivers(run, receivers, count, 0);
 }
 
-/* Marks what is no receiver, for good. */
+/* Marks what is no receiver, for good, and counts the others. */
 static void clear_tile(void *context, uint32_t item)
 {
     struct run *run = context;
     struct tile t = tile_of(run, item);
-    uint64_t receivers = 0;
+    uint64_t receivers = 0, full = 0;
     for (uint32_t y = t.y0; y < t.y1; y++)
         for (uint32_t x = t.x0; x < t.x1; x++) {
             struct trace_receiver receiver;
             uint32_t pixel = y * run->job->width + x;
-            if (read_receiver(run, pixel, &receiver))
+            if (read_receiver(run, pixel, &receiver)) {
                 receivers++;
-            else
+                full += run->kept.samples && (!run->kept.full || run->kept.full[pixel]);
+            } else {
                 store(run, pixel, run->mean_emission, 1, 0, 0);
+            }
         }
     atomic_fetch_add(&run->receivers, receivers);
+    atomic_fetch_add(&run->full_receivers, full);
 }
 
 /* Up to a packet of the receivers from `first` on; returns how many. */
@@ -362,9 +328,9 @@ static void pretest_tile(void *context, uint32_t item)
             if (run->early)
                 seen = run->early[pixel] = (uint8_t)(run->early[pixel] + seen);
             seen += rim.count[lane];
-            run->verdicts[pixel] = seen == TRACE_PRETEST_NET + TRACE_PRETEST_RIM ? LIT
-                                   : seen == 0                                   ? UMBRA
-                                                                                 : MIXED;
+            run->kept.verdicts[pixel] = seen == TRACE_PRETEST_NET + TRACE_PRETEST_RIM ? LIT
+                                        : seen == 0                                   ? UMBRA
+                                                                                      : MIXED;
         }
         rays += sums.rays + rim.rays;
     }
@@ -382,8 +348,8 @@ static void settle_tile(void *context, uint32_t item)
     for (uint32_t y = t.y0; y < t.y1; y++)
         for (uint32_t x = t.x0; x < t.x1; x++) {
             static const float zero[3];
-            uint32_t pixel = y * run->job->width + x, verdict = run->verdicts[pixel];
-            if (run->full[pixel])
+            uint32_t pixel = y * run->job->width + x, verdict = run->kept.verdicts[pixel];
+            if (run->kept.full[pixel])
                 continue;
             if (verdict == UMBRA)
                 store(run, pixel, zero, 0, 0, 0);
@@ -399,7 +365,8 @@ static bool spread(struct run *run)
 {
     const struct pen_trace_job *job = run->job;
     uint32_t radius = job->dilation ? job->dilation : TRACE_DILATION;
-    return trace_verdicts_spread(run->verdicts, job->width, job->height, radius, run->full);
+    return trace_verdicts_spread(
+        run->kept.verdicts, job->width, job->height, radius, run->kept.full);
 }
 
 static bool check_job(
@@ -470,14 +437,14 @@ static bool select_receivers(
     size_t count = (size_t)run->job->width * run->job->height;
     /* What is coloured or weighted is not to be told from counts. */
     bool early = run->job->step && run->mode == TRACE_COUNT_ONLY;
-    run->verdicts = calloc(count, 1);
+    run->kept.verdicts = calloc(count, 1);
     if (early && !(run->early = calloc(count, 1)))
         return pen_fail(error, PEN_INTERNAL, "", "Out of memory.");
     if (early && (!over_tiles(run, threads, early_tile, cpu_seconds) ||
                      !look_up(run, threads, TRACE_PRETEST_FIRST, cpu_seconds) || run->enough))
         return true;
-    run->full = calloc(count, 1);
-    if (!run->verdicts || !run->full)
+    run->kept.full = calloc(count, 1);
+    if (!run->kept.verdicts || !run->kept.full)
         return pen_fail(error, PEN_INTERNAL, "", "Out of memory.");
     if (over_tiles(run, threads, pretest_tile, cpu_seconds) && !spread(run))
         return pen_fail(error, PEN_INTERNAL, "", "Out of memory.");
@@ -486,39 +453,55 @@ static bool select_receivers(
     return true;
 }
 
-/* Sums that last from block to block, if there is room. */
-static void make_sums(struct run *run)
-{
-    size_t count = (size_t)run->job->width * run->job->height;
-    bool plain = run->mode == TRACE_COUNT_ONLY;
-    size_t bytes = sizeof *run->counts + (plain ? 0 : sizeof *run->sums);
-    if (!run->job->step || run->points.block_count == 1 || count > SUMS_BYTES / bytes)
-        return;
-    run->counts = calloc(count, sizeof *run->counts);
-    run->sums = plain || !run->counts ? NULL : calloc(count, sizeof *run->sums);
-    if (plain || run->sums)
-        return;
-    free(run->counts);
-    run->counts = NULL;
-}
-
 /* All samples of who needs them: block by block, or each tile at once. */
 static bool sample_all(struct run *run, uint32_t threads, double *cpu_seconds)
 {
-    make_sums(run);
-    uint32_t blocks = run->counts ? run->points.block_count : 1;
-    run->taken = 0;
-    for (run->block = 0; run->block < blocks; run->block++) {
+    const struct pen_trace_job *job = run->job;
+    size_t count = (size_t)job->width * job->height;
+    bool in_steps = run->keeps || (job->step && run->points.block_count > 1);
+    if (in_steps && !run->kept.counts)
+        trace_kept_make(&run->kept, count, run->mode == TRACE_COUNT_ONLY);
+    uint32_t blocks = run->kept.counts ? run->points.block_count : 1;
+    run->taken = run->kept.samples;
+    if (run->taken == run->samples)
+        return over_tiles(run, threads, estimate_tile, cpu_seconds);
+    if (run->taken && !look_up(run, threads, run->taken, cpu_seconds))
+        return false;
+    for (run->block = run->kept.blocks; run->block < blocks && !run->enough; run->block++) {
         uint32_t end = run->taken + run->points.blocks[run->block].count;
         if (!over_tiles(run, threads, sample_tile, cpu_seconds))
             return false;
+        run->kept.samples = end;
+        run->kept.blocks = run->block + 1;
         if (run->block + 1 < blocks && !look_up(run, threads, end, cpu_seconds))
             return false;
-        if (run->enough)
-            return true;
         run->taken = end;
     }
     return true;
+}
+
+static void take_over(struct run *run)
+{
+    struct pen_trace_kept **from = run->job->kept;
+    const struct pen_trace_job *job = run->job;
+    run->keeps = from && run->samples >= TRACE_FIRST_BLOCK && job->target_error == 0;
+    if (!run->keeps || !*from || (*from)->samples > run->samples ||
+        (*from)->receivers != (size_t)job->width * job->height)
+        return;
+    run->kept = **from;
+    free(*from);
+    *from = NULL;
+}
+
+static void leave(struct run *run)
+{
+    struct pen_trace_kept *to = NULL;
+    if (!run->keeps || !run->kept.counts || !run->kept.samples || !(to = malloc(sizeof *to)))
+        return;
+    *to = run->kept;
+    run->kept = (struct pen_trace_kept){0};
+    pen_trace_kept_destroy(*run->job->kept);
+    *run->job->kept = to;
 }
 
 bool pen_trace_visibility(struct pen_trace_scene *scene, const struct pen_trace_light *light,
@@ -556,14 +539,19 @@ bool pen_trace_visibility(struct pen_trace_scene *scene, const struct pen_trace_
     run.tiles_x = (job->width + run.tile_width - 1) / run.tile_width;
     run.tiles = run.tiles_x * ((job->height + run.tile_height - 1) / run.tile_height);
     uint32_t threads = trace_thread_count(job->threads);
+    take_over(&run);
     over_tiles(&run, threads, clear_tile, &cpu_seconds);
-    if (job->adaptive && run.samples > TRACE_PRETEST_NET + TRACE_PRETEST_RIM &&
-        !select_receivers(&run, threads, &cpu_seconds, error))
+    if (run.kept.verdicts)
+        over_tiles(&run, threads, settle_tile, &cpu_seconds);
+    else if (job->adaptive && !run.kept.samples &&
+             run.samples > TRACE_PRETEST_NET + TRACE_PRETEST_RIM &&
+             !select_receivers(&run, threads, &cpu_seconds, error))
         goto fail;
     if (!run.enough && !sample_all(&run, threads, &cpu_seconds)) {
         pen_fail(error, PEN_DEADLINE, "", "The deadline passed while rays were traced.");
         goto fail;
     }
+    leave(&run);
     if (stats) {
         double seconds = trace_seconds() - start;
         *stats = (struct pen_trace_stats){.rays = run.rays,
@@ -582,10 +570,7 @@ bool pen_trace_visibility(struct pen_trace_scene *scene, const struct pen_trace_
 fail:
     trace_hierarchy_release(scene, hierarchy);
     trace_points_finish(&run.points);
-    free(run.verdicts);
-    free(run.full);
     free(run.early);
-    free(run.counts);
-    free(run.sums);
+    trace_kept_finish(&run.kept);
     return ok;
 }

@@ -145,8 +145,7 @@ static bool test_page(
         if (fresh >> i & 1)
             block.samples[block.count[0]++] = entry_of(r, page->points[i], i);
     }
-    r->maps[number] =
-        pass_sample_page(run, points, page->count, params->map_size, number, wanted, error);
+    r->maps[number] = pass_sample_page(run, points, page->count, params->map_size, wanted, error);
     if (!r->maps[number])
         return false;
     r->used.words[number] |= fresh;

@@ -79,7 +79,7 @@ static bool record(struct technique_run *run, struct pen_error *error)
             kept = NULL;
         }
         struct sample_batch batch = {
-            "multisample lookup", points + done, n, params->map_size, done, keep, 1};
+            "multisample lookup", points + done, n, params->map_size, keep, 1};
         if (kept)
             kept->samples = 0;
         if (!sample_batch_add(run, &batch, sum, error))

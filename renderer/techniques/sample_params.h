@@ -17,7 +17,6 @@ struct sample_batch {
     const char *name;                  /* of the pass */
     const struct sample_point *points; /* [count] */
     uint32_t count, map_size;
-    uint32_t number; /* as pass_sample_maps takes them */
     bool keep;
     uint32_t total; /* samples that the sum will be the mean of; 1: it is a sum */
 };
@@ -29,7 +28,7 @@ static inline bool sample_batch_add(struct technique_run *run, const struct samp
     struct lookup_block block = {.count = {(int32_t)b->count}, .weight = {1.0f / (float)b->total}};
     const struct gl_texture *maps;
     if (!pass_sample_maps(
-            run, b->points, b->count, b->map_size, b->number, b->keep, block.samples, &maps, error))
+            run, b->points, b->count, b->map_size, b->keep, block.samples, &maps, error))
         return false;
     struct pass_texture texture = {UNIT_SAMPLE_MAPS, maps->name, GL_SAMPLE_NEAREST_BORDER};
     return pass_screen(run,

@@ -68,7 +68,7 @@ static bool add_samples(struct technique_run *run, uint32_t first, bool keep,
     const struct temporal *params = run->params;
     struct sample_point points[SAMPLE_MAP_BATCH];
     struct sample_batch batch = {
-        "temporal lookup", points, params->samples, params->map_size, first, keep, params->samples};
+        "temporal lookup", points, params->samples, params->map_size, keep, params->samples};
     sample_sequence(run->face, first, params->samples, points);
     return sample_batch_add(run, &batch, sum, error);
 }

@@ -4,9 +4,10 @@ set(extra ${CMAKE_CURRENT_SOURCE_DIR}/out_of_tree)
 set(shadow ${CMAKE_CURRENT_BINARY_DIR}/out_of_tree)
 file(READ ${registry} lines)
 file(CONFIGURE OUTPUT ${shadow}/renderer/techniques/registry.def
-    CONTENT "${lines}TECHNIQUE(dimmed)\n" @ONLY)
+    CONTENT "${lines}TECHNIQUE(dimmed)\nTECHNIQUE(sample_probe)\n" @ONLY)
 penumbra_shader_sources(${shadow}/gl_sources.c ${PENUMBRA_SHADERS} ${extra}/dimmed.glsl)
 add_library(penumbra_extended OBJECT ${CMAKE_SOURCE_DIR}/renderer/registry.c ${extra}/dimmed.c
+    ${extra}/sample_probe.c
     ${shadow}/gl_sources.c)
 target_include_directories(penumbra_extended BEFORE PRIVATE ${shadow})
 target_link_libraries(penumbra_extended PUBLIC penumbra_accuracy)

@@ -46,7 +46,7 @@ bool pass_light_samples(struct technique_run *run, uint32_t maps, uint32_t map_s
             .cell = {2 / sqrtf((float)maps), 1.0f / (float)(sparse ? per_pixel : maps)}};
         const struct gl_texture *layers;
         if (!pass_sample_maps(
-                run, points + first, count, map_size, first, keep, block.samples, &layers, error) ||
+                run, points + first, count, map_size, keep, block.samples, &layers, error) ||
             !look_up(run, &block, layers, sparse, false, error) ||
             (textured && !look_up(run, &block, layers, sparse, true, error)))
             return false;

@@ -1,4 +1,5 @@
 #include "renderer/passes/light/sample_maps.h"
+#include "protocol/fnv.h"
 #include "renderer/passes/draw/passes.h"
 #include "renderer/passes/draw/turn.h"
 #include "renderer/passes/map/depth_map.h"
@@ -137,20 +138,22 @@ static bool build(struct technique_run *run, const struct shadow_key *key,
 }
 
 static const struct shadow_input *get(struct technique_run *run, const char *kind,
-    const struct sample_point *points, uint32_t count, uint32_t size, uint32_t number,
-    shadow_build build_input, struct pen_error *error)
+    const struct sample_point *points, uint32_t count, uint32_t size, shadow_build build_input,
+    struct pen_error *error)
 {
-    struct shadow_key key = {.kind = kind, .size = size, .extra = {number, count}};
-    memcpy(&key.extra[2], points[0].at, 8);
-    memcpy(&key.extra[4], points[count - 1].at, 8);
+    struct shadow_key key = {.kind = kind, .size = size, .extra = {count}};
+    uint64_t hash = PEN_FNV_START;
+    for (uint32_t i = 0; i < count; i++)
+        hash = pen_fnv(hash, points[i].at, sizeof points[i].at);
+    memcpy(&key.extra[1], &hash, sizeof hash);
     pending.points = points;
     pending.count = count;
     return shadow_cache_get(run, &key, build_input, error);
 }
 
 bool pass_sample_maps(struct technique_run *run, const struct sample_point *points, uint32_t count,
-    uint32_t size, uint32_t number, bool keep, struct sample_map *table,
-    const struct gl_texture **maps, struct pen_error *error)
+    uint32_t size, bool keep, struct sample_map *table, const struct gl_texture **maps,
+    struct pen_error *error)
 {
     for (uint32_t i = 0; i < count; i++) {
         float rect[4];
@@ -160,7 +163,7 @@ bool pass_sample_maps(struct technique_run *run, const struct sample_point *poin
     run->result->shadow_maps += count;
     if (keep) {
         const struct shadow_input *input =
-            get(run, "sample maps", points, count, size, number, build, error);
+            get(run, "sample maps", points, count, size, build, error);
         *maps = input ? &input->textures[0] : NULL;
         return input != NULL;
     }
@@ -172,11 +175,11 @@ bool pass_sample_maps(struct technique_run *run, const struct sample_point *poin
 }
 
 const struct gl_texture *pass_sample_page(struct technique_run *run,
-    const struct sample_point *points, uint32_t count, uint32_t size, uint32_t number,
-    uint32_t wanted, struct pen_error *error)
+    const struct sample_point *points, uint32_t count, uint32_t size, uint32_t wanted,
+    struct pen_error *error)
 {
     const struct shadow_input *input =
-        get(run, "sample page", points, count, size, number, allocate, error);
+        get(run, "sample page", points, count, size, allocate, error);
     if (!input)
         return NULL;
     /* The cache owns the input; which of its layers are drawn is the page's own business. */

@@ -42,14 +42,14 @@ bool pass_sample_views(struct technique_run *run, const struct sample_view *view
     const struct gl_texture *array, struct pen_error *error);
 
 /* The maps of points[0 .. count), count <= SAMPLE_MAP_BATCH, size x size, D32F layers of
- * (*maps)->textures[0]. Kept between requests when `keep`, else in scratch memory that the next
- * call reuses. `number` tells batches of one set apart. Fills table[count]. */
+ * (*maps)->textures[0]. Kept between requests when `keep`, and found again by their points, else in
+ * scratch memory that the next call reuses. Fills table[count]. */
 bool pass_sample_maps(struct technique_run *run, const struct sample_point *points, uint32_t count,
-    uint32_t size, uint32_t number, bool keep, struct sample_map *table,
-    const struct gl_texture **maps, struct pen_error *error);
+    uint32_t size, bool keep, struct sample_map *table, const struct gl_texture **maps,
+    struct pen_error *error);
 
 /* A kept array with room for points[0 .. count) that is drawn as it is asked for: after the call
  * the layers whose bit is set in `wanted` are there. Layer i shows points[i]. */
 const struct gl_texture *pass_sample_page(struct technique_run *run,
-    const struct sample_point *points, uint32_t count, uint32_t size, uint32_t number,
-    uint32_t wanted, struct pen_error *error);
+    const struct sample_point *points, uint32_t count, uint32_t size, uint32_t wanted,
+    struct pen_error *error);

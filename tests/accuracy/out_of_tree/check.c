@@ -24,6 +24,19 @@ static void check_share(const uint8_t *id, const char *settings, double share)
     harness_shot_finish(&shot);
 }
 
+/* Two sets of points that begin and end alike are two sets of maps; the same set is found again. */
+static void check_sample_maps(const uint8_t *id)
+{
+    struct shot shot;
+    for (int again = 0; again < 2; again++) {
+        harness_shot(id, "technique=sample-probe&" HARNESS_VIEW HARNESS_RECT, &shot);
+        CHECK(shot.visibility[3] == 1);
+        CHECK(shot.result.shadow_maps == 6);
+        CHECK(shot.result.shadow_inputs_reused == (uint32_t)again);
+        harness_shot_finish(&shot);
+    }
+}
+
 int main(void)
 {
     const struct pen_catalogue *catalogue = pen_renderer_catalogue();
@@ -37,5 +50,8 @@ int main(void)
         half);
     check_share(half, "technique=dimmed&" HARNESS_VIEW HARNESS_RECT, 0.25);
     check_share(half, "technique=dimmed&share=0.5&" HARNESS_VIEW HARNESS_RECT, 0.5);
+    uint8_t demo[PEN_ID_BYTES];
+    harness_scene(&(struct pen_generated_options){.kind = PEN_GENERATED_DEMO}, demo);
+    check_sample_maps(demo);
     CHECK_DONE();
 }

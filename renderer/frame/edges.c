@@ -7,8 +7,7 @@
 #include "renderer/passes/draw/turn.h"
 #include <stdio.h>
 
-#define SHARED_ROWS "renderer/shaders/screen/open_tiles.def"
-#include "renderer/shared/rows_c.h"
+_Static_assert(OPEN_TILE == 4, "edge_tiles.frag looks at so many");
 
 #define BAND_PIXELS (4u << 20) /* whose places are in memory together: 64 MiB */
 
@@ -28,7 +27,6 @@ static bool find_tiles(
     uint32_t width = (job->request->width + OPEN_TILE - 1) / OPEN_TILE;
     uint32_t height = (job->request->height + OPEN_TILE - 1) / OPEN_TILE;
     gl_target_fit(target, GL_RG8, width, height, 0, 1);
-    struct open_tiles_block block = {.tile = {OPEN_TILE}};
     bool layered = frame_is_layered(job);
     struct pass_texture depths[] = {
         {UNIT_DEPTH, job->targets->gbuffer.depth.texture.name, GL_SAMPLE_NEAREST},
@@ -43,9 +41,7 @@ static bool find_tiles(
             .texture_count = layered ? 2 : 1,
             .framebuffer = target->framebuffer,
             .width = width,
-            .height = height,
-            .extra = &block,
-            .extra_bytes = sizeof block},
+            .height = height},
         error);
 }
 

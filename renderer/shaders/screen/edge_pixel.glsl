@@ -11,10 +11,17 @@ float depth_at(ivec2 pixel)
     return texelFetch(g_depth, pixel, 0).r;
 }
 
+// Of four pixels, and of those beside them.
+bvec4 are_bent(vec4 left, vec4 right, vec4 above, vec4 below, vec4 depth)
+{
+    vec4 bend = max(abs(left + right - 2.0 * depth), abs(above + below - 2.0 * depth));
+    vec4 rise = abs(left - right) + abs(above - below) + 2e-4 * depth;
+    return greaterThan(bend, 0.1 * rise);
+}
+
 bool is_bent(vec2 low, vec2 high, float depth)
 {
-    vec2 bend = abs(low + high - 2.0 * depth), rise = abs(low - high) + 1e-4 * depth;
-    return max(bend.x, bend.y) > 0.1 * (rise.x + rise.y);
+    return are_bent(vec4(low.x), vec4(high.x), vec4(low.y), vec4(high.y), vec4(depth)).x;
 }
 
 #ifdef LAYERED

@@ -1,18 +1,59 @@
-// One fragment per tile: may one of its pixels show an edge?
+// One fragment per tile of 4 x 4 pixels: may one of them show an edge?
 #include "view.glsl"
 #include "edge_pixel.glsl"
 #include "tile_class.def"
-#include "open_tiles.def"
 
 layout(location = 0) out vec4 tile_class; // class / 255
 
+// Depths of four pixels in a row, and of those beside them.
+struct Row {
+    float left;
+    vec4 own;
+    float right;
+};
+
+// Of four depths in a square, in textureGather's order, three times.
+Row upper_row(vec4 a, vec4 b, vec4 c)
+{
+    return Row(a.w, vec4(a.z, b.w, b.z, c.w), c.z);
+}
+
+Row lower_row(vec4 a, vec4 b, vec4 c)
+{
+    return Row(a.x, vec4(a.y, b.x, b.y, c.x), c.y);
+}
+
+int bits_of_row(Row above, Row row, Row below)
+{
+    bvec4 bent = are_bent(vec4(row.left, row.own.xyz), vec4(row.own.yzw, row.right), above.own,
+        below.own, row.own);
+    return int(dot(vec4(bent), vec4(1.0, 2.0, 4.0, 8.0)));
+}
+
+// A bit for each pixel.
+int bent_pixels(ivec2 first, bool front)
+{
+    vec4 d[9];
+    for (int i = 0; i < 9; i++) {
+        vec2 corner = vec2(first + 2 * ivec2(i % 3, i / 3)) * view.viewport.zw;
+        d[i] = textureGather(g_depth, corner);
+#ifdef LAYERED
+        d[i] = front ? max(d[i], textureGather(front_depth, corner)) : d[i];
+#endif
+    }
+    Row above = upper_row(d[0], d[1], d[2]), r0 = lower_row(d[0], d[1], d[2]),
+        r1 = upper_row(d[3], d[4], d[5]), r2 = lower_row(d[3], d[4], d[5]),
+        r3 = upper_row(d[6], d[7], d[8]), below = lower_row(d[6], d[7], d[8]);
+    return bits_of_row(above, r0, r1) + (bits_of_row(r0, r1, r2) << 4) +
+           (bits_of_row(r1, r2, r3) << 8) + (bits_of_row(r2, r3, below) << 12);
+}
+
 void main()
 {
-    ivec2 last = ivec2(view.viewport.xy) - 1, first = ivec2(gl_FragCoord.xy) * open_tiles.tile.x;
-    ivec2 end = min(first + open_tiles.tile.x, last + 1);
-    bool edges = false;
-    for (int y = first.y; y < end.y && !edges; y++)
-        for (int x = first.x; x < end.x; x++)
-            edges = edges || may_show_edge(ivec2(x, y), last);
-    tile_class = vec4(edges ? TILE_UNDECIDED : TILE_LIT, 0.0, 0.0, 0.0) / 255.0;
+    ivec2 first = ivec2(gl_FragCoord.xy) * 4;
+    int bent = bent_pixels(first, false);
+#ifdef LAYERED
+    bent |= bent_pixels(first, true);
+#endif
+    tile_class = vec4(bent != 0 ? TILE_UNDECIDED : TILE_LIT, 0.0, 0.0, 0.0) / 255.0;
 }

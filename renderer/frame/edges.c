@@ -1,4 +1,5 @@
 #include "renderer/frame/edges.h"
+#include "protocol/memory.h"
 #include "renderer/frame/needs.h"
 #include "renderer/passes/draw/passes.h"
 #include "renderer/passes/draw/places.h"
@@ -6,6 +7,7 @@
 #include "renderer/passes/draw/tiles.h"
 #include "renderer/passes/draw/turn.h"
 #include <stdio.h>
+#include <stdlib.h>
 
 _Static_assert(OPEN_TILE == 4, "edge_tiles.frag looks at so many");
 
@@ -26,7 +28,7 @@ static bool find_tiles(
     struct gl_target *target = pass_targets(job->ctx, &key);
     uint32_t width = (job->request->width + OPEN_TILE - 1) / OPEN_TILE;
     uint32_t height = (job->request->height + OPEN_TILE - 1) / OPEN_TILE;
-    gl_target_fit(target, GL_RG8, width, height, 0, 1);
+    gl_target_fit(target, GL_RG32F, width, height, 0, 1);
     bool layered = frame_is_layered(job);
     struct pass_texture depths[] = {
         {UNIT_DEPTH, job->targets->gbuffer.depth.texture.name, GL_SAMPLE_NEAREST},
@@ -43,6 +45,19 @@ static bool find_tiles(
             .width = width,
             .height = height},
         error);
+}
+
+/* Into which tiles triangles have to be drawn once more, and before what. The caller frees it. */
+static float *read_tiles(const struct frame_job *job, const struct gl_texture *tiles)
+{
+    size_t n = (size_t)tiles->width * tiles->height;
+    float *found = pen_alloc(2 * n, sizeof *found);
+    gl_timer_begin(&job->ctx->timer, PEN_STAGE_SHADE, "edge tiles");
+    gl.GetTextureImage(tiles->name, 0, GL_RG, GL_FLOAT, (GLsizei)(2 * n * sizeof *found), found);
+    for (size_t i = 0; i < n; i++)
+        found[i] = found[2 * i] == (float)TILE_LIT ? 2 : found[2 * i + 1];
+    gl_timer_end(&job->ctx->timer);
+    return found;
 }
 
 static bool blend(const struct frame_job *job, const struct gl_texture *picture,
@@ -107,15 +122,23 @@ bool frame_edges_blend(const struct frame_job *job, const struct view *view, boo
     if (!fill(job, resolved, raw, error) || !find_tiles(job, &tiles, error))
         return false;
     bool ok = true;
+    /* Elsewhere than in software triangles cost less than to wait for what was drawn. */
+    float *farthest = job->ctx->software ? read_tiles(job, tiles) : NULL;
+    struct pick_tiles wanted = {tiles->width, tiles->height, (float)r->width / OPEN_TILE,
+        (float)r->height / OPEN_TILE, farthest};
+    const struct pick_tiles *only = farthest ? &wanted : NULL;
     for (uint32_t first = 0; ok && first < r->height; first += most) {
         uint32_t rows = r->height - first < most ? r->height - first : most;
+        struct places_pass solid = {
+            layered ? PLACES_SOLID : PLACES_ALL, r->ground.on, first, rows, only};
+        struct places_pass front = {PLACES_BLENDED, false, first, rows, only};
         struct edges_block block;
-        ok = pass_places(job->ctx, job->scene, view, layered ? PLACES_SOLID : PLACES_ALL,
-                 r->ground.on, first, rows, &t->places, &block, error) &&
-             (!layered || pass_places(job->ctx, job->scene, view, PLACES_BLENDED, false, first,
-                              rows, &t->front_places, &block, error)) &&
+        ok = pass_places(job->ctx, job->scene, view, &solid, &t->places, &block, error) &&
+             (!layered || pass_places(job->ctx, job->scene, view, &front, &t->front_places, &block,
+                              error)) &&
              blend(job, resolved ? &t->stairs.texture : &t->beauty.texture, defines, &block, tiles,
                  error);
     }
+    free(farthest);
     return ok;
 }

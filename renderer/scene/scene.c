@@ -469,6 +469,12 @@ static bool culls_back(
     return view->faces == CULL_SINGLE_SIDED && !group->double_sided;
 }
 
+static void use_indices(const struct scene *s, GLuint buffer)
+{
+    gl.VertexArrayElementBuffer(s->depth_array, buffer);
+    gl.VertexArrayElementBuffer(s->full_array, buffer);
+}
+
 uint64_t scene_draw(struct scene *s, const struct cull_view *view, const struct scene_pass *pass)
 {
     struct run {
@@ -477,6 +483,8 @@ uint64_t scene_draw(struct scene *s, const struct cull_view *view, const struct 
     };
     uint32_t total = 0;
     uint64_t triangles = 0;
+    struct picked picked = {0};
+    GLuint own = 0;
     struct run *runs = pen_alloc_zero(s->group_count + 1, sizeof *runs);
     for (uint32_t g = 0; g < s->group_count; g++) {
         runs[g].first = total;
@@ -485,9 +493,13 @@ uint64_t scene_draw(struct scene *s, const struct cull_view *view, const struct 
             continue;
         for (uint32_t i = 0; i < s->groups[g].count; i++) {
             uint32_t instance = s->order[s->groups[g].first + i];
+            uint32_t before = total;
             if (!pass->hidden || !pass->hidden[instance])
                 triangles += cull_instance(
                     view, &s->blob, instance, runs[g].cull_back, s->command_room, &total);
+            if (pass->tiles)
+                pick_triangles(pass->tiles, view->world_to_clip, &s->blob, s->command_room, before,
+                    &total, &picked);
         }
         runs[g].count = total - runs[g].first;
     }
@@ -496,6 +508,13 @@ uint64_t scene_draw(struct scene *s, const struct cull_view *view, const struct 
     gl.NamedBufferData(s->commands, (GLsizeiptr)(total * sizeof *s->command_room), s->command_room,
         GL_STREAM_DRAW);
     gl.BindBuffer(GL_DRAW_INDIRECT_BUFFER, s->commands);
+    if (pass->tiles) {
+        triangles = picked.count / 3;
+        gl.CreateBuffers(1, &own);
+        gl.NamedBufferStorage(
+            own, (GLsizeiptr)(picked.count * sizeof *picked.indices), picked.indices, 0);
+        use_indices(s, own);
+    }
     gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, STORAGE_MATERIALS, s->materials);
     for (uint32_t g = 0; g < s->group_count; g++) {
         const struct scene_group *group = &s->groups[g];
@@ -519,7 +538,11 @@ uint64_t scene_draw(struct scene *s, const struct cull_view *view, const struct 
     gl.FrontFace(GL_CCW);
     for (GLuint i = 0; i < SCENE_UNITS; i++)
         gl.BindSampler(i, 0);
+    if (own)
+        use_indices(s, s->indices);
+    gl.DeleteBuffers(1, &own);
 done:
+    free(picked.indices);
     free(runs);
     return triangles;
 }

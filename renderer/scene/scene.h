@@ -2,6 +2,7 @@
 #pragma once
 #include "renderer/blob/pscene.h"
 #include "renderer/scene/cull.h"
+#include "renderer/scene/pick.h"
 #include "renderer/scene/stage.h"
 #include "renderer/gl/program.h"
 #include "renderer/gl/texture.h"
@@ -111,9 +112,10 @@ void scene_instance_bounds(
 struct scene_pass {
     GLuint opaque, textured;
     bool full; /* draws with all attributes and textures; else positions only where it can */
-    bool front_is_clockwise; /* the target's y axis is flipped */
-    const bool *hidden;      /* instances to leave out, or NULL */
-    bool blended;            /* BLEND materials alone */
+    bool front_is_clockwise;        /* the target's y axis is flipped */
+    const bool *hidden;             /* instances to leave out, or NULL */
+    bool blended;                   /* BLEND materials alone */
+    const struct pick_tiles *tiles; /* only triangles that may be seen there; NULL: all */
 };
 /* Returns the triangles drawn. The caller has bound framebuffer, viewport and depth state. */
 uint64_t scene_draw(

@@ -52,14 +52,17 @@ static void draw_band(struct technique_ctx *ctx, struct scene *scene, const stru
 }
 
 bool pass_places(struct technique_ctx *ctx, struct scene *scene, const struct view *view,
-    enum places_kind kind, bool ground, uint32_t first, uint32_t rows, struct gl_target *depths,
-    struct edges_block *where, struct pen_error *error)
+    const struct places_pass *which, struct gl_target *depths, struct edges_block *where,
+    struct pen_error *error)
 {
     static const float zero[4] = {0};
+    enum places_kind kind = which->kind;
+    uint32_t first = which->first, rows = which->rows;
     const char *alpha = kind == PLACES_SOLID ? "#define ALPHA\n#define SOLID\n" : "#define ALPHA\n";
     struct scene_pass pass = {.opaque = program(ctx, NULL, error),
         .textured = program(ctx, alpha, error),
-        .blended = kind == PLACES_BLENDED};
+        .blended = kind == PLACES_BLENDED,
+        .tiles = which->tiles};
     GLuint flat = program(ctx, "#define FULL\n#define GROUND\n", error), block;
     if (!pass.opaque || !pass.textured || !flat)
         return false;
@@ -76,7 +79,7 @@ bool pass_places(struct technique_ctx *ctx, struct scene *scene, const struct vi
     bool more = true, ok = true;
     pass_bands_begin(ctx, &bands, view->width, rows, FIRST_PIXELS);
     while (ok && more) {
-        draw_band(ctx, scene, view, &pass, ground && !pass.blended ? flat : 0, first, &bands,
+        draw_band(ctx, scene, view, &pass, which->ground && !pass.blended ? flat : 0, first, &bands,
             depths, block);
         ok = pass_bands_next(ctx, &bands, &more, error);
     }

@@ -8,8 +8,15 @@
 /* Whose depths. */
 enum places_kind { PLACES_ALL, PLACES_SOLID, PLACES_BLENDED }; /* solid: see GBUFFER_SOLID */
 
-/* What the view sees at EDGE_PLACES places of the pixels in `rows` rows from `first`, into a target
- * of so many samples. `where`: the places. */
+struct places_pass {
+    enum places_kind kind;
+    bool ground;
+    uint32_t first, rows;           /* of the picture */
+    const struct pick_tiles *tiles; /* elsewhere depths may be missing; or NULL */
+};
+
+/* What the view sees at EDGE_PLACES places of the pixels in some rows, into a target of so many
+ * samples. `where`: the places. */
 bool pass_places(struct technique_ctx *ctx, struct scene *scene, const struct view *view,
-    enum places_kind kind, bool ground, uint32_t first, uint32_t rows, struct gl_target *depths,
-    struct edges_block *where, struct pen_error *error);
+    const struct places_pass *which, struct gl_target *depths, struct edges_block *where,
+    struct pen_error *error);

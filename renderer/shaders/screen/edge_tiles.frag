@@ -3,7 +3,8 @@
 #include "edge_pixel.glsl"
 #include "tile_class.def"
 
-layout(location = 0) out vec4 tile_class; // class / 255
+// Class / 255; the farthest depth in the tile and beside it.
+layout(location = 0) out vec2 tile_class;
 
 // Depths of four pixels in a row, and of those beside them.
 struct Row {
@@ -25,22 +26,25 @@ Row lower_row(vec4 a, vec4 b, vec4 c)
 
 int bits_of_row(Row above, Row row, Row below)
 {
-    bvec4 bent = are_bent(vec4(row.left, row.own.xyz), vec4(row.own.yzw, row.right), above.own,
-        below.own, row.own);
+    bvec4 bent = are_bent(
+        vec4(row.left, row.own.xyz), vec4(row.own.yzw, row.right), above.own, below.own, row.own);
     return int(dot(vec4(bent), vec4(1.0, 2.0, 4.0, 8.0)));
 }
 
 // A bit for each pixel.
-int bent_pixels(ivec2 first, bool front)
+int bent_pixels(ivec2 first, bool front, out float farthest)
 {
+    vec4 least = vec4(1.0);
     vec4 d[9];
     for (int i = 0; i < 9; i++) {
         vec2 corner = vec2(first + 2 * ivec2(i % 3, i / 3)) * view.viewport.zw;
         d[i] = textureGather(g_depth, corner);
+        least = min(least, d[i]);
 #ifdef LAYERED
         d[i] = front ? max(d[i], textureGather(front_depth, corner)) : d[i];
 #endif
     }
+    farthest = min(min(least.x, least.y), min(least.z, least.w));
     Row above = upper_row(d[0], d[1], d[2]), r0 = lower_row(d[0], d[1], d[2]),
         r1 = upper_row(d[3], d[4], d[5]), r2 = lower_row(d[3], d[4], d[5]),
         r3 = upper_row(d[6], d[7], d[8]), below = lower_row(d[6], d[7], d[8]);
@@ -51,9 +55,10 @@ int bent_pixels(ivec2 first, bool front)
 void main()
 {
     ivec2 first = ivec2(gl_FragCoord.xy) * 4;
-    int bent = bent_pixels(first, false);
+    float farthest;
+    int bent = bent_pixels(first, false, farthest);
 #ifdef LAYERED
-    bent |= bent_pixels(first, true);
+    bent |= bent_pixels(first, true, farthest);
 #endif
-    tile_class = vec4(bent != 0 ? TILE_UNDECIDED : TILE_LIT, 0.0, 0.0, 0.0) / 255.0;
+    tile_class = vec2(float(bent != 0 ? TILE_UNDECIDED : TILE_LIT) / 255.0, farthest);
 }

@@ -1,0 +1,23 @@
+/* Of what is drawn, single triangles: software rasterisers pay for each of them, and most for those
+ * that are drawn at several places of every pixel. */
+#pragma once
+#include "renderer/scene/cull.h"
+
+/* Square tiles of a picture, in some of which triangles are wanted. */
+struct pick_tiles {
+    uint32_t width, height;
+    float across, down;    /* tiles between the borders of clip space; row 0 is at y = 1 */
+    const float *farthest; /* width x height: the farthest depth (reversed) that is wanted there;
+                              above 1: nothing is */
+};
+
+struct picked {
+    uint32_t *indices; /* freed by the caller */
+    size_t count, room;
+};
+
+/* Of the commands from `first` on, which are of one instance, leaves one at most: of the triangles
+ * that are wanted, appended to picked->indices. */
+void pick_triangles(const struct pick_tiles *tiles, const mat4 world_to_clip,
+    const struct psc_scene *blob, struct cull_command *commands, uint32_t first, uint32_t *count,
+    struct picked *picked);

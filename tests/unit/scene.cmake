@@ -1,0 +1,1 @@
+penumbra_unit_test(pick pick.c LIBS penumbra_renderer)

@@ -34,10 +34,17 @@ struct technique_turns {
     GLsync fence; /* of the last piece but one */
 };
 
+/* What a software rasteriser takes for the pixels of a pass. */
+struct technique_speed {
+    uint32_t program;
+    double ms_per_pixel; /* 0: not known */
+};
+
 /* What a frame in progress has for itself, and what all of them share. There are as many as frames
  * that may be in progress side by side (renderer/lane.h), and they live as long as the context. */
 struct technique_ctx {
     struct technique_turns turns;
+    struct technique_speed speeds[64];
     uint32_t lane; /* number of this one */
     struct gl_programs *programs;
     struct gl_samplers samplers;

@@ -4,7 +4,7 @@
 #include "renderer/passes/draw/turn.h"
 #include <stdio.h>
 
-#define FIRST_PIXELS (1u << 16)
+#define FIRST_PIXELS (1u << 14)
 
 static void bind_textures(
     struct technique_ctx *ctx, const struct pass_texture *textures, uint32_t count)
@@ -107,7 +107,8 @@ static bool draw(const struct drawing *d, struct pen_error *error)
     if (d->tiles)
         gl.ProgramUniform2i(d->program, LOCATION_TILE, d->tile_px, d->tile_class);
     bind(d);
-    pass_bands_begin(d->ctx, &bands, d->width, d->height, FIRST_PIXELS);
+    pass_bands_begin(d->ctx, &bands, d->width, d->height, FIRST_PIXELS,
+        d->tiles ? 0 : d->program); /* how much tiles cost does not follow from their pixels */
     while (ok && more) {
         if (turn != d->ctx->turns.number)
             bind(d);

@@ -3,8 +3,10 @@
 #include <math.h>
 
 #define BAND_PIXELS_ON_GPU (1u << 24)
-#define BAND_ROWS                                                                                  \
-    64 /* a multiple of a software rasteriser's tiles and of a shader's 2 x 2 pixels */
+/* Of a software rasteriser's tiles; where these take too long, a part of one, in whole blocks of 4 x 4
+ * pixels. */
+#define BAND_ROWS 64
+#define LEAST_BAND_ROWS 16
 
 /* Waits until what was handed over before the last call is done, so that no more than two pieces are
  * ever under way: elsewhere than on a CPU, time passes on the device. */
@@ -63,15 +65,50 @@ bool pass_turn_inside(struct technique_ctx *ctx, struct pen_error *error)
     return pass_turn(ctx, error);
 }
 
-void pass_bands_begin(struct technique_ctx *ctx, struct pass_bands *bands, uint32_t width,
-    uint32_t height, uint32_t first_pixels)
+static uint32_t whole_rows(double rows, uint32_t program)
 {
-    uint32_t pixels = ctx->software ? first_pixels : BAND_PIXELS_ON_GPU;
-    uint32_t rows = pixels / width / BAND_ROWS * BAND_ROWS;
-    *bands = (struct pass_bands){0, rows > BAND_ROWS ? rows : BAND_ROWS, height, width, 0};
+    uint32_t least = program ? LEAST_BAND_ROWS : BAND_ROWS;
+    double most = fmin(fmax(rows, least), 1 << 20);
+    uint32_t step = most >= BAND_ROWS ? BAND_ROWS : least;
+    return (uint32_t)most / step * step;
+}
+
+/* What is known of a program; of one that is not known yet 0, in place of another. */
+static struct technique_speed *speed_of(struct technique_ctx *ctx, uint32_t program)
+{
+    struct technique_speed *speed =
+        &ctx->speeds[program % (sizeof ctx->speeds / sizeof *ctx->speeds)];
+    if (speed->program != program)
+        *speed = (struct technique_speed){.program = program};
+    return speed;
+}
+
+void pass_bands_begin(struct technique_ctx *ctx, struct pass_bands *bands, uint32_t width,
+    uint32_t height, uint32_t first_pixels, uint32_t program)
+{
+    double pixels = ctx->software ? first_pixels : BAND_PIXELS_ON_GPU;
+    double known = ctx->software && program ? speed_of(ctx, program)->ms_per_pixel : 0;
+    if (known > 0)
+        pixels = ctx->turns.most_ms / known;
+    *bands = (struct pass_bands){0, whole_rows(pixels / width, program), height, width, program, 0};
     if (is_whole(&ctx->turns) || bands->rows > height)
         bands->rows = height;
     bands->since_ms = gl_now_ms();
+}
+
+/* The band is done: how long it took, and how many rows the next one should have. */
+static void learn(struct technique_ctx *ctx, struct pass_bands *bands)
+{
+    gl.Finish();
+    double ms = fmax(gl_now_ms() - bands->since_ms, 1e-3);
+    if (bands->program) {
+        /* Of unlike amounts of work the most counts, and is forgotten slowly. */
+        struct technique_speed *speed = speed_of(ctx, bands->program);
+        double now = ms / ((double)bands->rows * bands->width);
+        speed->ms_per_pixel = fmax(now, 0.7 * speed->ms_per_pixel);
+    }
+    bands->rows =
+        whole_rows(fmin(bands->rows * ctx->turns.most_ms / ms, 8.0 * bands->rows), bands->program);
 }
 
 void pass_bands_crop(const struct pass_bands *bands, float top, mat4 to_clip)
@@ -95,6 +132,8 @@ bool pass_bands_next(
     struct technique_ctx *ctx, struct pass_bands *bands, bool *more, struct pen_error *error)
 {
     if (bands->rows == bands->height) {
+        if (ctx->software && bands->program && !is_whole(&ctx->turns))
+            learn(ctx, bands);
         *more = false;
         return true;
     }
@@ -103,12 +142,8 @@ bool pass_bands_next(
     *more = bands->y < bands->height;
     if (!*more)
         return true;
-    if (ctx->software) {
-        gl.Finish();
-        double ms = fmax(gl_now_ms() - bands->since_ms, 1e-3);
-        double rows = fmin(bands->rows * ctx->turns.most_ms / ms, 8.0 * bands->rows);
-        bands->rows = rows < BAND_ROWS ? BAND_ROWS : (uint32_t)rows / BAND_ROWS * BAND_ROWS;
-    }
+    if (ctx->software)
+        learn(ctx, bands);
     uint32_t left = bands->height - bands->y;
     bands->rows = bands->rows < left ? bands->rows : left;
     if (!pass_turn(ctx, error))

@@ -15,11 +15,13 @@ void pass_bind_counts(struct technique_ctx *ctx, GLuint buffer);
 /* A large drawing is cut into bands of rows, each as long as a turn should last. */
 struct pass_bands {
     uint32_t y, rows, height, width; /* px; the band at hand: y to y + rows */
+    uint32_t program;
     double since_ms;
 };
-/* first_pixels: of the first band, before the drawing's speed is known. */
+/* first_pixels: of the first band, as long as the drawing's speed is not known. That is kept for a
+ * `program` whose work lies in its pixels; 0: for none. */
 void pass_bands_begin(struct technique_ctx *ctx, struct pass_bands *bands, uint32_t width,
-    uint32_t height, uint32_t first_pixels);
+    uint32_t height, uint32_t first_pixels, uint32_t program);
 /* What outside the band need not be drawn: narrows a matrix to clip space, in which row 0 is at y =
  * `top` (-1 or 1). */
 void pass_bands_crop(const struct pass_bands *bands, float top, mat4 to_clip);

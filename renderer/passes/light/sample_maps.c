@@ -9,7 +9,7 @@
 #include <math.h>
 #include <string.h>
 
-#define MAPS_AT_ONCE 4 /* between two looks at the time */
+#define MOST_AT_ONCE 8 /* maps between two looks at the time */
 
 static float radical_inverse(uint32_t i)
 {
@@ -80,16 +80,25 @@ bool pass_sample_views(struct technique_run *run, const struct sample_view *view
 {
     GLuint framebuffer;
     bool ok = true;
+    uint32_t at_once = 1, drawn = 0;
     gl_timer_begin(&run->ctx->timer, PEN_STAGE_SHADOW, "sample maps");
     gl.CreateFramebuffers(1, &framebuffer);
+    double since_ms = gl_now_ms();
     for (uint32_t i = 0; ok && i < count; i++) {
         const struct sample_view *view = &views[i];
         gl.NamedFramebufferTextureLayer(
             framebuffer, GL_DEPTH_ATTACHMENT, array->name, 0, (GLint)view->layer);
         ok = pass_draw_casters(
             run, framebuffer, array->width, view->point.at, view->rect, false, error);
-        if (ok && i % MAPS_AT_ONCE == MAPS_AT_ONCE - 1)
-            ok = pass_turn_inside(run->ctx, error);
+        if (!ok || ++drawn < at_once)
+            continue;
+        if (run->ctx->software)
+            gl.Finish();
+        double fit = drawn * run->ctx->turns.most_ms / fmax(gl_now_ms() - since_ms, 1e-3);
+        at_once = (uint32_t)fmin(fmax(fit, 1), fmin(2 * at_once, MOST_AT_ONCE));
+        drawn = 0;
+        ok = pass_turn_inside(run->ctx, error);
+        since_ms = gl_now_ms();
     }
     gl.DeleteFramebuffers(1, &framebuffer);
     gl_timer_end(&run->ctx->timer);

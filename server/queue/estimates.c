@@ -15,6 +15,9 @@
 #define MOST_RISE 4.0
 #define MOST_FALL 8.0
 #define HALF_LIFE_MS 6e4 /* of the sureness of what was not seen again */
+/* The least that was seen falls at once and rises little with each that took longer. */
+#define LEAST_RISE 1.1
+#define DOUBT_MS 1e4 /* between two that are let in to see */
 
 enum level { LEVEL_SAME, LEVEL_SETTINGS, LEVEL_METHOD, LEVELS };
 static const double sureness[LEVELS] = {0.6, 0.4, 0.2};
@@ -23,6 +26,8 @@ struct entry {
     uint64_t key; /* 0: unused */
     uint64_t seen_ns;
     double rate; /* ms per unit of work */
+    double least;
+    uint64_t doubted_ns; /* when one was refused first, or let in to see; 0: never */
 };
 
 struct estimates {
@@ -77,6 +82,11 @@ static const struct entry *find(const struct estimates *e, uint64_t key)
     return NULL;
 }
 
+static double ms_between(uint64_t from_ns, uint64_t to_ns)
+{
+    return to_ns > from_ns ? (double)(to_ns - from_ns) / 1e6 : 0;
+}
+
 struct estimate estimates_of(
     const struct estimates *e, const struct pen_request *r, uint64_t now_ns)
 {
@@ -84,11 +94,26 @@ struct estimate estimates_of(
         const struct entry *entry = find(e, key_of(r, level));
         if (!entry)
             continue;
-        double age_ms = now_ns > entry->seen_ns ? (double)(now_ns - entry->seen_ns) / 1e6 : 0;
-        return (struct estimate){.ms = entry->rate * work_of(e, r, level),
-            .sure = sureness[level] * exp2(-age_ms / HALF_LIFE_MS)};
+        double work = work_of(e, r, level);
+        return (struct estimate){.ms = entry->rate * work,
+            .sure = sureness[level] * exp2(-ms_between(entry->seen_ns, now_ns) / HALF_LIFE_MS),
+            .least_ms = level == LEVEL_SAME ? entry->least * work : 0};
     }
-    return (struct estimate){-1, 0};
+    return (struct estimate){-1, 0, 0};
+}
+
+bool estimates_doubt(struct estimates *e, const struct pen_request *r, uint64_t now_ns)
+{
+    for (int level = 0; level < LEVELS; level++) {
+        struct entry *entry = (struct entry *)find(e, key_of(r, level));
+        if (!entry)
+            continue;
+        bool due = entry->doubted_ns && ms_between(entry->doubted_ns, now_ns) > DOUBT_MS;
+        if (due || !entry->doubted_ns)
+            entry->doubted_ns = now_ns;
+        return due;
+    }
+    return false;
 }
 
 /* The entry of that key, or in place of the one not seen for longest. */
@@ -119,6 +144,7 @@ void estimates_learn(
             continue;
         struct entry *entry = entry_for(e, key);
         double old = entry->rate;
+        entry->least = old > 0 ? fmin(rate, LEAST_RISE * entry->least) : rate;
         rate = old > 0 ? fmin(fmax(rate, old / MOST_FALL), old * MOST_RISE) : rate;
         entry->rate = old > 0 ? old + (rate < old ? FALL : RISE) * (rate - old) : rate;
         entry->seen_ns = now_ns;

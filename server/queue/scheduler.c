@@ -197,16 +197,17 @@ static void attach(struct scheduler *s, struct render *render, struct waiter *wa
 }
 
 /* What comes first leaves too little of the time that the waiter has: *error says so. A render that
- * takes too long even alone is let in: its estimate may be wrong. */
-static bool is_late(const struct scheduler *s, const struct render *render, uint64_t payer,
+ * takes too long even alone is let in: its estimate may be wrong. What it takes itself, and so how far
+ * others are in its way, counts only as far as like ones on its own scene have shown: others' dear
+ * renders tell nothing of it. */
+static bool is_late(struct scheduler *s, const struct render *render, uint64_t payer,
     const struct waiter *waiter, struct pen_error *error)
 {
     uint64_t now = s->limits.now_ns();
     double left = waiter->deadline_ns > now ? clock_ms(waiter->deadline_ns - now) : 0;
-    double own =
-        render->estimate.ms < 0 || waiter->best ? 0 : render->estimate.sure * render->estimate.ms;
+    double own = waiter->best ? 0 : render->estimate.sure * render->estimate.least_ms;
     double wait = wait_ms(s, payer, render->batch, own), over = wait + fmin(own, left / 2) - left;
-    if (!(wait > 0 && over > 0))
+    if (!(wait > 0 && over > 0) || estimates_doubt(s->estimates, &render->request, now))
         return false;
     pen_fail(error, PEN_UNAVAILABLE, "/deadline_ms",
         "What was asked for before takes about %.1f s: the image would not be ready in time.",

@@ -31,10 +31,11 @@ static void on_work(void *context)
     (void)context;
 }
 
+static uint64_t only; /* whose renders there is room for; 0: everybody's */
 static enum take fits(void *context, struct render *render)
 {
-    (void)context, (void)render;
-    return TAKE_FITS;
+    (void)context;
+    return only && render->account->client != only ? TAKE_LATER : TAKE_FITS;
 }
 
 static struct scheduler *make(uint32_t queue)
@@ -265,6 +266,74 @@ static void test_correction(void)
     scheduler_destroy(s);
 }
 
+/* Clients who make renders look dear, their own or others', and keep the renderer busy with them, get
+ * nobody else refused: not on other scenes, and on theirs only until one was let in to see. */
+static void test_dear_ones(void)
+{
+    struct scheduler *s = make(1000);
+    static struct client c[400];
+    struct render seen;
+    int next = 0;
+    for (int i = 0; i < 15; i++) {
+        CHECK(submit(s, &c[next++], (struct ask){"a", 1, false, 1 + i % 5, 0, 0}));
+        CHECK(run(s, 60000, 0, &seen));
+    }
+    int refused[2] = {0}, late = 0;
+    for (int second = 0; second < 60; second++) {
+        for (uint64_t who = 1; who <= 5 && second % 10 == 0; who++)
+            CHECK(submit(s, &c[next++], (struct ask){"a", 1, false, who, 0, 0}));
+        for (uint8_t scene = 1; scene <= 2; scene++) {
+            uint64_t who = 10 + scene;
+            if (submit(s, &c[next++], (struct ask){"a", scene, false, who, 5000, 0})) {
+                only = who; /* it has its turns beside the dear ones */
+                CHECK(run(s, 100, 0, &seen) == who);
+                only = 0;
+            } else {
+                refused[scene - 1]++;
+                late += second >= 30;
+                CHECK(c[next - 1].code == PEN_UNAVAILABLE && c[next - 1].retry_after_s > 0);
+            }
+        }
+        if (second % 10 == 5)
+            run(s, 60000, 0, &seen); /* one of the five */
+        now_ns += CLOCK_S;
+    }
+    CHECK(refused[1] == 0);
+    CHECK(refused[0] > 0 && refused[0] <= 12 && late == 0);
+    scheduler_cancel(s);
+    scheduler_destroy(s);
+}
+
+/* One that looked cheap takes what its client may have, and no more: others are served as before. */
+static void test_cheap_looks(void)
+{
+    struct scheduler *s = make(1000);
+    static struct client c[400];
+    struct render seen;
+    int next = 0;
+    double had[3] = {0};
+    for (int i = 0; i < 20; i++) {
+        CHECK(submit(s, &c[next++], (struct ask){"a", 1, false, 1, 0, 0}));
+        CHECK(run(s, 1, 0, &seen) == 1);
+    }
+    for (int i = 0; i < 100; i++) {
+        CHECK(submit(s, &c[next++], (struct ask){"a", 1, false, 1, 0, 0}));
+        CHECK(submit(s, &c[next++], (struct ask){"b", 2, false, 2, 0, 0}));
+    }
+    for (int i = 0; i < 60; i++) {
+        struct render *render = scheduler_take(s, &(struct taker){fits, NULL, 0});
+        uint64_t who = render->account->client;
+        double ms = who == 1 ? 2000 : 100;
+        now_ns += (uint64_t)(ms * 1e6);
+        struct pen_result result = {.turns_ms = ms};
+        scheduler_finish(s, render, &(struct outcome){.result = &result});
+        had[who] += ms;
+    }
+    CHECK(had[2] > 1000 && had[1] <= had[2] + 4000);
+    scheduler_cancel(s);
+    scheduler_destroy(s);
+}
+
 /* Larger pictures of the same kind are expected to take longer; the table is bounded. */
 static void test_estimates(void)
 {
@@ -318,6 +387,8 @@ int main(void)
     test_places();
     test_deadlines();
     test_correction();
+    test_dear_ones();
+    test_cheap_looks();
     test_estimates();
     test_many_names();
     CHECK_DONE();

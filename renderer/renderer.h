@@ -45,7 +45,7 @@ bool pen_renderer_render(struct pen_renderer *renderer, const struct pen_request
     struct pen_frame *frame, struct pen_result *result, struct pen_error *error);
 /* The same in pieces. Several may be in progress side by side; what is pointed at stays until the
  * end. `frame` and `result` are filled at the end. */
-#define PEN_MAX_RENDERS 4
+#define PEN_MAX_RENDERS 6
 struct pen_render;
 /* The blobs that a request needs: the scene's, then those of its images. */
 struct pen_blobs {

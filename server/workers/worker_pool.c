@@ -153,6 +153,7 @@ static void bury(struct slot *slot)
     pthread_mutex_lock(&pool->lock);
     slot->resident.count = 0;
     pthread_mutex_unlock(&pool->lock);
+    homes_forget(pool->homes, slot->index);
     slot->failures = slot->said_hello ? 0 : slot->failures + 1;
     slot->is_replacement = true;
     for (int i = 0; i < IN_FLIGHT; i++) {
@@ -174,6 +175,7 @@ static bool dispatch(struct slot *slot, struct flight *flight, struct render *re
     struct outcome outcome = {0};
     flight->render = render;
     slot->place = render->place;
+    homes_take(pool->homes, render, slot->index, clock_now_ns());
     flight->phase = PHASE_SENT;
     flight->cancelled = flight->part_wanted = false;
     flight->since_ns = clock_now_ns();
@@ -364,6 +366,7 @@ struct worker_pool *worker_pool_create(const struct worker_pool_config *config)
     pool->config = *config;
     pthread_mutex_init(&pool->lock, NULL);
     pool->quarantine = quarantine_create(config->quarantine_s);
+    pool->homes = homes_create();
     for (uint32_t i = 0; i < config->workers; i++) {
         struct slot *slot = &pool->slots[i];
         slot->pool = pool;
@@ -399,6 +402,7 @@ void worker_pool_destroy(struct worker_pool *pool)
     }
     pthread_mutex_destroy(&pool->lock);
     quarantine_destroy(pool->quarantine);
+    homes_destroy(pool->homes);
     free(pool);
 }
 

@@ -8,6 +8,9 @@
 /* One that finds no room is passed so often before others wait for it, and they do so for so long. */
 #define MOST_PASSED 8
 #define KEPT_FREE_NS (10 * CLOCK_S)
+/* So many places are for those who want little, and so long a render may be for that. */
+#define LAST_TURNS 2
+#define SHORT_MS 500.0
 
 void worker_slot_finish(struct slot *slot, struct flight *flight, const struct outcome *outcome)
 {
@@ -158,10 +161,27 @@ static enum take pass(struct slot *slot, struct render *render)
     return TAKE_LATER;
 }
 
+/* Whatever takes long leaves the last places to others: batches, what is known to take long, and
+ * what comes from a client who has one already. */
+static bool may_have_last(const struct slot *slot, const struct render *render)
+{
+    const struct estimate *estimate = &render->estimate;
+    if (render->batch || (estimate->ms > 0 && estimate->sure * estimate->ms > SHORT_MS))
+        return false;
+    for (int i = 0; i < IN_FLIGHT; i++) {
+        const struct render *other = slot->flights[i].render;
+        if (is_in_turns(&slot->flights[i]) && !other->batch && other->payer == render->payer)
+            return false;
+    }
+    return true;
+}
+
 enum take worker_slot_fits(void *context, struct render *render)
 {
     struct slot *slot = context;
     uint32_t count = 0;
+    if (homes_is_away(slot->pool->homes, render, slot->index, clock_now_ns()))
+        return TAKE_LATER;
     for (int i = 0; i < IN_FLIGHT; i++) {
         if (!is_in_turns(&slot->flights[i]))
             continue;
@@ -173,6 +193,9 @@ enum take worker_slot_fits(void *context, struct render *render)
     }
     if (count == IN_TURNS)
         return TAKE_NOTHING;
+    uint32_t kept = render->passed < MOST_PASSED ? LAST_TURNS : 1;
+    if (count >= IN_TURNS - kept && !may_have_last(slot, render))
+        return TAKE_LATER;
     bool was_busy = count && render->busy_worker == slot->index + 1;
     return was_busy && render->busy_ended == slot->ended ? pass(slot, render) : TAKE_FITS;
 }

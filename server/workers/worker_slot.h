@@ -1,6 +1,7 @@
 /* One worker as its thread in the pool sees it, and what the worker says. */
 #pragma once
 #include "server/base/process.h"
+#include "server/queue/homes.h"
 #include "server/workers/worker_figures.h"
 #include <pthread.h>
 
@@ -51,6 +52,7 @@ struct slot {
 struct worker_pool {
     struct worker_pool_config config;
     struct quarantine *quarantine;
+    struct homes *homes;
     pthread_mutex_t lock; /* guards numbers, and what says so in the slots */
     struct worker_pool_numbers numbers;
     bool stopping; /* atomic */

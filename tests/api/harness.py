@@ -255,7 +255,7 @@ def png(width, height):
 
 
 SMALL = {"technique": {"name": "hard"}, "width": 64, "height": 48}
-IN_TURNS = 4  # renders that a worker takes at a time
+IN_TURNS = 4  # renders of one client that a worker takes at a time
 # Takes a worker a good while: for tests that need one under way.
 HEAVY = {"technique": {"name": "multisample", "params": {"samples": 64}}, "width": 800, "height": 600}
 

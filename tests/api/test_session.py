@@ -171,6 +171,43 @@ class Session(unittest.TestCase):
         self.assertEqual(frames(self.picture("c"))[0], 1)
 
 
+class Workers(unittest.TestCase):
+    """Of several workers one has what a session's frames have left."""
+
+    def setUp(self):
+        self.d = Daemon("--client-share=0", "--workers=3")
+        self.addCleanup(self.d.kill)
+        wait(lambda: self.d.metric("penumbra_workers_up") == 3)
+        self.scene = self.d.upload(sliding_box())
+
+    def frame(self, session):
+        answer = self.d.render(self.scene, dict(SMALL, session=session, **VIEW), timeout=300)
+        self.assertEqual(answer.status, 200, answer.body)
+        return frames(answer)[0]
+
+    def test_frames_go_where_the_last_one_is(self):
+        told = {name: [] for name in "abcdef"}
+
+        def ask(name):
+            for _ in range(5):
+                told[name].append(self.frame(name))
+        threads = [threading.Thread(target=ask, args=(name,)) for name in told]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        self.assertEqual(told, {name: list(range(5)) for name in told})
+
+    def test_workers_that_are_gone(self):
+        self.assertEqual([self.frame("s") for _ in range(3)], [0, 1, 2])
+        workers = self.d.children("penumbra-worker")
+        for pid in workers:  # the session's is among them
+            os.kill(pid, signal.SIGKILL)
+        wait(lambda: self.d.metric("penumbra_workers_up") == 3 and
+             not set(workers) & set(self.d.children("penumbra-worker")))
+        self.assertEqual([self.frame("s") for _ in range(3)], [0, 1, 2])
+
+
 class Moving(unittest.TestCase):
     """A plate slides over a floor: its shadow leaves no trail."""
 

@@ -46,9 +46,9 @@ class Turns(unittest.TestCase):
         self.small = self.d.render(self.scene, SMALL)
         self.assertEqual(self.small.status, 200)
 
-    def begin(self, request, scene=None):
-        """Sends a request without waiting for its answer."""
-        connection = http.client.HTTPConnection("127.0.0.1", self.d.port)
+    def begin(self, request, scene=None, who="127.0.0.1"):
+        """Sends a request of the client `who` without waiting for its answer."""
+        connection = http.client.HTTPConnection("127.0.0.1", self.d.port, source_address=(who, 0))
         connection.request("POST", "/v1/scenes/%s/render" % (scene or self.scene), json.dumps(request),
                            {"Content-Type": "application/json", "Cache-Control": "no-cache"})
         self.addCleanup(connection.close)
@@ -218,6 +218,21 @@ class Turns(unittest.TestCase):
             thread.join()
             self.assertEqual(answers[0].status, 200, answers[0].body)
         self.assertEqual(self.d.metric("penumbra_renders_refused_late_total"), 1)
+        self.check_nothing_happened()
+
+    def test_what_takes_long_leaves_places(self):
+        """Neither batches nor one client's long renders keep others out."""
+        for more, who in (({"priority": "batch"}, "127.0.0.1"), ({}, "127.0.0.2")):
+            long = [self.begin(dict(ENDLESS, exposure_ev=n, **more), who=who)
+                    for n in range(harness.IN_TURNS + 2)]
+            wait(lambda: self.running() == harness.IN_TURNS and
+                 self.d.metric("penumbra_queue_depth") == 2)
+            for _ in range(harness.IN_TURNS):
+                self.assertEqual(self.d.render(self.scene, SMALL).body, self.small.body)
+            self.assertEqual(self.running(), harness.IN_TURNS)
+            for connection in long:
+                connection.close()
+            wait(lambda: self.running() + self.d.metric("penumbra_queue_depth") == 0)
         self.check_nothing_happened()
 
     def descriptors(self):

@@ -67,7 +67,7 @@ static void set_number(struct pen_request *request, const char *name, double val
     const struct pen_technique_info *info =
         pen_catalogue_find(pen_renderer_catalogue(), request->technique);
     const struct pen_param *row = pen_param_find(info->params, name);
-    if (row && row->min <= value && row->max >= value)
+    if (row && (row->choices || (row->min <= value && row->max >= value)))
         pen_param_store(row, request->technique_params, &value, "", NULL);
 }
 
@@ -164,9 +164,15 @@ int main(void)
         }
         check_watching(r, &request);
     }
-    for (int i = 0; i < 2; i++) {
-        make_request(&request, scene, names[i], 1);
+    for (int i = 0; i < 3; i++) {
+        make_request(&request, scene, names[i ? 1 : 0], 1);
         request.output.layer = PEN_LAYER_VISIBILITY;
+        if (i == 2) { /* in compute shaders */
+            set_number(&request, "backend", 1);
+            set_number(&request, "samples", 512);
+            request.width = 48, request.height = 36;
+            check_watching(r, &request);
+        }
         check_falling(r, &request);
     }
     pen_renderer_destroy(r);

@@ -1,16 +1,20 @@
 /* Rays in compute shaders. Work is cut into short dispatches, each flushed on its own, so that no
  * driver's watchdog takes a long job for a hang. */
+#include "renderer/passes/draw/show.h"
 #include "renderer/passes/draw/turn.h"
 #include "renderer/passes/rays/ray_scene.h"
 #include "renderer/passes/rays/rays.h"
 #include "renderer/trace/points.h"
+#include <math.h>
 #include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #define RAYS_PER_DISPATCH (1u << 21) /* milliseconds on a GPU */
+#define RAYS_ON_SOFTWARE (1u << 15)  /* of the first, before its speed is known */
 #define RECEIVERS_PER_DISPATCH (1u << 17)
+#define RECEIVERS_IN_STEPS (1u << 22)  /* most whose sums all stay from block to block */
 #define POINTS_PER_DISPATCH (1u << 12) /* one invocation takes them one after the other */
 #define POINTS_ON_SOFTWARE 16u /* leaves 4096 turns of llvmpipe's loops for a ray: ray_bvh.glsl */
 
@@ -27,6 +31,10 @@ struct work {
     struct pen_trace_light light;
     struct trace_points points;
     uint32_t samples, listed;
+    uint32_t rays;                  /* that the next dispatch should trace */
+    bool in_steps;                  /* all receivers take a block before the next one begins */
+    bool enough;                    /* there are no more wanted */
+    bool cut_short;                 /* what was traced is of no use */
     const struct gl_target *marked; /* IMAGE_MARKS; NULL: nothing */
     bool pretest;
     char defines[512];
@@ -58,12 +66,19 @@ static void bind(const struct work *w);
 static bool dispatch(struct work *w, GLuint name, uint32_t x, uint32_t y, struct pen_error *error)
 {
     struct technique_ctx *ctx = w->run->ctx;
+    double start = gl_now_ms();
     gl.UseProgram(name);
     gl.DispatchCompute(x, y, 1);
     gl.MemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_SHADER_IMAGE_ACCESS_BARRIER_BIT |
                      GL_TEXTURE_FETCH_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
     gl.Flush();
     uint32_t turn = ctx->turns.number;
+    if (ctx->software && isfinite(ctx->turns.most_ms)) {
+        gl.Finish();
+        double turns = (gl_now_ms() - start) / fmax(ctx->turns.most_ms, 1);
+        double rays = w->rays * fmin(1 / fmax(turns, 1e-3), 2);
+        w->rays = (uint32_t)fmax(fmin(rays, RAYS_PER_DISPATCH), RAYS_ON_SOFTWARE / 4.0);
+    }
     bool ok = pass_turn_inside(ctx, error);
     if (turn != ctx->turns.number)
         bind(w);
@@ -139,7 +154,6 @@ static bool prepare(struct work *w, struct pen_error *error)
     fill_buffer(&t->job, sizeof block, &block);
     fill_buffer(&t->list, (GLsizeiptr)4 * width * height, NULL);
     fill_buffer(&t->counters, sizeof(struct ray_counters), &(struct ray_counters){0});
-    fill_buffer(&t->state, (GLsizeiptr)sizeof(struct ray_sums) * RECEIVERS_PER_DISPATCH, NULL);
     return true;
 }
 
@@ -171,6 +185,13 @@ static void bind(const struct work *w)
     gl.BindSampler(UNIT_EMISSION, w->run->ctx->samplers.names[GL_SAMPLE_LINEAR]);
 }
 
+static void unbind(void)
+{
+    for (GLuint unit = UNIT_RAY_POSITION; unit < UNIT_RAY_END; unit++)
+        gl.BindTextureUnit(unit, 0);
+    gl.BindSampler(UNIT_EMISSION, 0);
+}
+
 static void mark(struct work *w, const struct gl_target *target)
 {
     w->marked = target;
@@ -182,13 +203,13 @@ static bool pretest(struct work *w, struct pen_error *error)
 {
     uint32_t height = w->run->height, columns = groups(w->run->width, RAY_TILE);
     uint32_t row_rays = columns * RAY_TILE * RAY_TILE * (TRACE_PRETEST_NET + TRACE_PRETEST_RIM);
-    uint32_t rows = row_rays < RAYS_PER_DISPATCH ? RAYS_PER_DISPATCH / row_rays : 1;
     GLuint name = program(w, "ray_pretest.comp", error);
     if (!name)
         return false;
     mark(w, &w->targets->verdicts);
-    for (uint32_t y = 0; y < height; y += rows * RAY_TILE) {
+    for (uint32_t y = 0, rows; y < height; y += rows * RAY_TILE) {
         uint32_t left = groups(height - y, RAY_TILE);
+        rows = row_rays < w->rays ? w->rays / row_rays : 1;
         gl.ProgramUniform1ui(name, LOCATION_FIRST_ROW, y);
         if (!dispatch(w, name, columns, left < rows ? left : rows, error))
             return false;
@@ -217,31 +238,112 @@ static bool select_receivers(struct work *w, struct pen_error *error)
     return true;
 }
 
-/* All samples of the listed receivers from `first`, slice by slice of at most `most` points. Slices
- * hold whole pairs. */
-static bool sample_range(
-    struct work *w, GLuint name, uint32_t first, uint32_t most, struct pen_error *error)
+/* Points [point, end) of block b for `count` receivers from `first` on, whose sums begin at `state`;
+ * slice by slice of whole pairs and at most `most` points. */
+static bool sample_block(struct work *w, GLuint name, uint32_t b, const uint32_t range[4],
+    uint32_t state, uint32_t most, struct pen_error *error)
+{
+    uint32_t end = range[2] + range[3], step = 2;
+    bool may_stop = w->job->target_error > 0 && end >= TRACE_STOP_AFTER;
+    while (step * 2 <= most && step * 2 <= w->rays / range[1])
+        step *= 2;
+    for (uint32_t point = range[2]; point < end; point += step) {
+        uint32_t points = end - point < step ? end - point : step;
+        bool last = point + points == end;
+        gl.ProgramUniform4ui(name, LOCATION_RANGE, range[0], range[1], point, points);
+        gl.ProgramUniform1ui(name, LOCATION_STATE, state);
+        gl.ProgramUniform1ui(name, LOCATION_ENDS,
+            last && b + 1 == w->points.block_count ? RAY_ENDS
+            : last && may_stop                     ? RAY_MAY_END
+                                                   : RAY_GOES_ON);
+        if (!dispatch(w, name, groups(range[1], RAY_GROUP), 1, error))
+            return false;
+    }
+    return true;
+}
+
+/* What all have so far becomes the result; those that are not done stay so. */
+static bool estimate(struct work *w, GLuint name, uint32_t taken, struct pen_error *error)
+{
+    for (uint32_t first = 0, count; first < w->listed; first += count) {
+        count = w->listed - first;
+        count = count < RECEIVERS_PER_DISPATCH ? count : RECEIVERS_PER_DISPATCH;
+        gl.ProgramUniform4ui(name, LOCATION_RANGE, first, count, taken, 0);
+        gl.ProgramUniform1ui(name, LOCATION_STATE, first);
+        gl.ProgramUniform1ui(name, LOCATION_ENDS, RAY_IS_SEEN);
+        if (!dispatch(w, name, groups(count, RAY_GROUP), 1, error))
+            return false;
+    }
+    return true;
+}
+
+static bool is_cut(const struct work *w)
+{
+    return read_counters(w).cut != 0;
+}
+
+/* All receivers have had so many samples. */
+static bool look_up(struct work *w, GLuint name, uint32_t taken, struct pen_error *error)
+{
+    struct technique_run *run = w->run;
+    enum technique_step step = pass_step(run, taken, w->samples);
+    if (step == STEP_GO_ON)
+        return true;
+    w->cut_short = is_cut(w);
+    if (w->cut_short)
+        return true;
+    w->enough = step == STEP_STOP;
+    if (!estimate(w, name, taken, error))
+        return false;
+    if (w->enough)
+        return true;
+    gl_timer_end(&run->ctx->timer);
+    unbind();
+    bool ok = w->job->settle(run, error) && pass_show(run, error);
+    bind(w);
+    gl_timer_begin(&run->ctx->timer, PEN_STAGE_TECHNIQUE, "ray samples");
+    return ok;
+}
+
+/* How many receivers come next; each takes a few points at a time. */
+static uint32_t slice(const struct work *w, uint32_t first)
+{
+    uint32_t count = w->rays / POINTS_ON_SOFTWARE, left = w->listed - first;
+    count = count < RECEIVERS_PER_DISPATCH ? count : RECEIVERS_PER_DISPATCH;
+    count = count > RAY_GROUP ? count : RAY_GROUP;
+    return count < left ? count : left;
+}
+
+/* Block by block, for all of the list. */
+static bool sample_in_steps(struct work *w, GLuint name, uint32_t most, struct pen_error *error)
 {
     const struct trace_points *p = &w->points;
-    uint32_t left = w->listed - first, step = 2, point = 0;
-    uint32_t count = left < RECEIVERS_PER_DISPATCH ? left : RECEIVERS_PER_DISPATCH;
-    while (step * 2 <= most && step * 2 <= RAYS_PER_DISPATCH / count)
-        step *= 2;
-    for (uint32_t b = 0; b < p->block_count; b++) {
-        uint32_t end = point + p->blocks[b].count;
-        for (; point < end; point += step) {
-            uint32_t points = end - point < step ? end - point : step;
-            bool last = point + points == end;
-            gl.ProgramUniform4ui(name, LOCATION_RANGE, first, count, point, points);
-            bool may_stop = w->job->target_error > 0 && end >= TRACE_STOP_AFTER;
-            gl.ProgramUniform1ui(name, LOCATION_ENDS,
-                last && b + 1 == p->block_count ? 2u
-                : last && may_stop              ? 1u
-                                                : 0u);
-            if (!dispatch(w, name, groups(count, RAY_GROUP), 1, error))
+    uint32_t point = 0;
+    for (uint32_t b = 0; b < p->block_count && !w->enough && !w->cut_short; b++) {
+        for (uint32_t first = 0, count; first < w->listed; first += count) {
+            count = slice(w, first);
+            const uint32_t range[4] = {first, count, point, p->blocks[b].count};
+            if (!sample_block(w, name, b, range, first, most, error))
                 return false;
         }
-        point = end;
+        point += p->blocks[b].count;
+        if (b + 1 < p->block_count && !look_up(w, name, point, error))
+            return false;
+    }
+    return true;
+}
+
+/* A part of the list after the other, each with all of its blocks. */
+static bool sample_in_parts(struct work *w, GLuint name, uint32_t most, struct pen_error *error)
+{
+    const struct trace_points *p = &w->points;
+    for (uint32_t first = 0, count; first < w->listed; first += count) {
+        count = slice(w, first);
+        for (uint32_t b = 0, point = 0; b < p->block_count; point += p->blocks[b++].count) {
+            const uint32_t range[4] = {first, count, point, p->blocks[b].count};
+            if (!sample_block(w, name, b, range, 0, most, error))
+                return false;
+        }
     }
     return true;
 }
@@ -251,15 +353,20 @@ static bool sample(struct work *w, struct pen_error *error)
     GLuint name = program(w, "ray_samples.comp", error);
     if (!name)
         return false;
+    w->in_steps = w->run->watch && w->points.block_count > 1 && w->listed <= RECEIVERS_IN_STEPS;
+    uint32_t kept =
+        w->in_steps && w->listed > RECEIVERS_PER_DISPATCH ? w->listed : RECEIVERS_PER_DISPATCH;
+    fill_buffer(&w->targets->state, (GLsizeiptr)sizeof(struct ray_sums) * kept, NULL);
+    bind(w);
     uint32_t most = w->run->ctx->software ? POINTS_ON_SOFTWARE : POINTS_PER_DISPATCH;
     for (; most >= 2; most /= 2) {
         static const uint32_t zero;
         gl.NamedBufferSubData(
             w->targets->counters, offsetof(struct ray_counters, cut), sizeof zero, &zero);
-        for (uint32_t first = 0; first < w->listed; first += RECEIVERS_PER_DISPATCH)
-            if (!sample_range(w, name, first, most, error))
-                return false;
-        if (!read_counters(w).cut)
+        w->cut_short = w->enough = false;
+        if (!(w->in_steps ? sample_in_steps : sample_in_parts)(w, name, most, error))
+            return false;
+        if (w->enough || !is_cut(w))
             return true;
     }
     return pen_fail(
@@ -271,13 +378,6 @@ static void add_counts(const struct work *w)
     struct ray_counters counters = read_counters(w);
     w->run->result->rays += (uint64_t)counters.rays_high << 32 | counters.rays_low;
     w->run->result->full_work_pixels += counters.full_pixels;
-}
-
-static void unbind(void)
-{
-    for (GLuint unit = UNIT_RAY_POSITION; unit < UNIT_RAY_END; unit++)
-        gl.BindTextureUnit(unit, 0);
-    gl.BindSampler(UNIT_EMISSION, 0);
 }
 
 static const struct step {
@@ -306,6 +406,7 @@ bool pass_rays_device(struct technique_run *run, const struct ray_job *job,
     bool ok = prepare(&w, error);
     if (ok) {
         bind(&w);
+        w.rays = run->ctx->software ? RAYS_ON_SOFTWARE : RAYS_PER_DISPATCH;
         for (size_t i = w.pretest ? 0 : 1; ok && i < sizeof steps / sizeof *steps; i++)
             ok = run_step(&w, &steps[i], error);
         unbind();

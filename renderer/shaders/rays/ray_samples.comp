@@ -7,8 +7,10 @@ layout(binding = UNIT_EMISSION) uniform sampler2D emission_texture;
 
 // First entry of the list, entries, first point, points.
 layout(location = LOCATION_RANGE) uniform uvec4 range;
-// 1: a receiver may stop after this, 2: it must.
+// enum ray_end: what becomes of a receiver after this.
 layout(location = LOCATION_ENDS) uniform uint ends;
+// Where the sums of the first entry are.
+layout(location = LOCATION_STATE) uniform uint first_state;
 
 void finish(ivec2 pixel, inout RaySums sums)
 {
@@ -20,9 +22,10 @@ void finish(ivec2 pixel, inout RaySums sums)
     float weight = float(samples), visible = float(sums.count);
 #endif
     float error = samples > 1u && weight > 0.0 ? sqrt(sums.pairs) / weight : 0.0;
-    if (ends == 1u && !(error < ray.bias.y))
+    if (ends == RAY_MAY_END && !(error < ray.bias.y))
         return;
-    sums.pairs = -1.0;
+    if (ends != RAY_IS_SEEN)
+        sums.pairs = -1.0;
     vec4 v = vec4(0.0);
     if (weight > 0.0) {
         v.a = all_seen ? 1.0 : visible / weight;
@@ -86,14 +89,15 @@ void main()
         return;
     uint entry = list[range.x + gl_GlobalInvocationID.x], number = entry & ~LIST_LIT;
     ivec2 pixel = ivec2(number % ray.size.x, number / ray.size.x);
+    uint place = first_state + gl_GlobalInvocationID.x;
     RaySums sums = RaySums(0u, 0.0, 0.0, 0.0, vec4(0.0));
     if (range.z != 0u)
-        sums = state[gl_GlobalInvocationID.x];
+        sums = state[place];
     RayReceiver r;
     if (sums.pairs < 0.0 || !load_receiver(pixel, ray.net, r))
         return;
     take_samples(r, (entry & LIST_LIT) == 0u, sums);
-    if (ends != 0u)
+    if (ends != RAY_GOES_ON)
         finish(pixel, sums);
-    state[gl_GlobalInvocationID.x] = sums;
+    state[place] = sums;
 }

@@ -30,6 +30,9 @@ struct technique_turns {
     uint32_t number;
     uint32_t frame, light; /* that it is at */
     bool cancelled;
+    /* Beyond these the pass at hand is the last: of gl_now_ms, and of all turns together; 0: none. */
+    double stop_ms, stop_used_ms;
+    bool stopped; /* it was */
     bool held;    /* what is under way must not be interrupted */
     GLsync fence; /* of the last piece but one */
 };
@@ -129,6 +132,9 @@ struct technique {
      * horizon.glsl says; of the other methods pass_screen fades it. */
     bool counts_horizon;
     size_t state_size;
+    /* Cheaper settings, "name=most name=most", of a method that has no steps (passes/draw/show.h): a
+     * picture that must not be late begins with them. NULL: it has, or is cheap. */
+    const char *sketch;
     bool keeps_sums;      /* goes on with what a request for fewer `samples` has left */
     bool estimates_error; /* fills technique_run.variance_framebuffer */
     bool (*create)(struct technique_ctx *, void *state, struct pen_error *); /* optional */

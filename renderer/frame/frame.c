@@ -19,8 +19,6 @@
 #include <stdio.h>
 #include <string.h>
 
-#define SHARED_ROWS "renderer/shaders/frame/view.def"
-#include "renderer/shared/rows_c.h"
 #define SHARED_ROWS "renderer/shaders/frame/shade.def"
 #include "renderer/shared/rows_c.h"
 
@@ -62,38 +60,6 @@ static void fit_targets(struct frame *f)
         frame_fit_sum(&t->beauty, GL_RGBA32F, r);
     if (frame_needs(r, PEN_SOURCE_VISIBILITY))
         frame_fit_sum(&t->visibility, GL_RGBA32F, r);
-}
-
-static void upload_view(struct frame *f, uint32_t number)
-{
-    const struct pen_request *r = f->job->request;
-    const struct view *v = &f->view;
-    struct view_block b = {0};
-    memcpy(b.world_to_clip, v->world_to_clip, sizeof b.world_to_clip);
-    memcpy(b.clip_to_world, v->clip_to_world, sizeof b.clip_to_world);
-    memcpy(b.eye, v->eye, 12);
-    b.eye[3] = 0.5f * (float)r->height / tanf(0.5f * v->fov_y_rad);
-    memcpy(b.forward, v->forward, 12);
-    b.forward[3] = v->near_z;
-    b.viewport[0] = (float)r->width, b.viewport[1] = (float)r->height;
-    b.viewport[2] = 1 / b.viewport[0], b.viewport[3] = 1 / b.viewport[1];
-    memcpy(b.ambient, r->ambient, 12);
-    if (r->background[0] != PEN_AUTO && !pen_request_is_transparent(r))
-        memcpy(b.background, r->background, 12);
-    memcpy(b.ground_albedo, r->ground_albedo, 12);
-    float center[3], radius = scene_radius(f->job->scene);
-    scene_center(f->job->scene, center);
-    bool empty = scene_is_empty(f->job->scene);
-    b.ground[0] = center[0], b.ground[2] = center[2];
-    /* A hair below the bounds, so that a floor of the scene itself hides it. */
-    b.ground[1] = (empty ? 0 : scene_floor(f->job->scene)) - 1e-4f * radius;
-    b.ground[3] = 12 * radius;
-    b.display[0] = exp2f(r->exposure_ev);
-    b.display[1] = (float)r->tone_map;
-    b.display[2] = (float)number;
-    b.display[3] = 1 / (float)r->antialias;
-    gl.NamedBufferData(f->job->ctx->view_block, sizeof b, &b, GL_STREAM_DRAW);
-    gl.BindBufferBase(GL_UNIFORM_BUFFER, UBO_VIEW, f->job->ctx->view_block);
 }
 
 static bool resolve_emissions(struct frame *f, struct pen_error *error)
@@ -240,43 +206,74 @@ static void aim_light(const struct frame *f, uint32_t light)
         gl_target_clear(vis, f->lights[light].faces[0].emission_mean);
 }
 
-static bool sketch_lights(struct frame *f, struct pen_error *error)
+/* Somebody looks, and there are several lights, or faces of one: SKETCH_SAMPLES of each come first,
+ * or there would be nothing to see before the last is at work. A method without steps has to be
+ * shown in time: it begins with cheaper settings. False: neither. */
+static bool lower(const struct frame *f, uint32_t *params)
 {
-    bool counted;
+    const struct technique *technique = f->job->technique;
+    const struct pen_param *row = pen_param_find(technique->info.params, "samples");
+    const double few = SKETCH_SAMPLES;
+    if (technique->sketch)
+        return frame_progress_is_limited(&f->progress) && frame_progress_lower(technique, params);
+    return f->progress.faces > 1 && f->progress.tracked && row &&
+           pen_param_load(row, params, 0) >= 4 * few &&
+           pen_param_store(row, params, &few, "", NULL);
+}
+
+/* Lights from `first` on. *is: there is something of them. */
+static bool sketch(struct frame *f, uint32_t first, uint32_t end, bool *is, struct pen_error *error)
+{
+    uint32_t params[PEN_TECHNIQUE_PARAM_BYTES / 4];
+    struct pen_result before = *f->result;
+    bool counted, ok = true;
+    memcpy(params, f->job->request->technique_params, sizeof params);
+    *is = lower(f, params);
+    if (!*is)
+        return true;
+    memcpy(f->job->request->technique_params, params, sizeof params);
     upload_params(f);
-    for (uint32_t i = 0; i < f->light_count; i++) {
+    f->sketching = true;
+    for (uint32_t i = first; i < end && ok; i++) {
         aim_light(f, i);
-        for (uint32_t k = 0; k < f->lights[i].face_count; k++)
-            if (!record_face(f, i, k, &counted, error))
-                return false;
+        for (uint32_t k = 0; k < f->lights[i].face_count && ok; k++)
+            ok = record_face(f, i, k, &counted, error);
     }
+    f->sketching = false;
+    *f->result = before; /* it counts nothing */
+    return ok;
+}
+
+/* In the first jittered frame. */
+static bool begin(struct frame *f, struct pen_error *error)
+{
+    struct frame_progress *p = &f->progress;
+    double start = p->ahead_ms = p->step_ms = frame_progress_ms(p);
+    bool is, steps = !f->job->technique->sketch;
+    if (!sketch(f, 0, f->light_count, &is, error))
+        return false;
+    f->sketched = is && steps;
+    if (f->sketched)
+        frame_progress_sketch(p, p->faces, SKETCH_SAMPLES);
+    if (!is || steps)
+        return true;
+    f->result->progress.done = 1; /* something is there */
+    frame_progress_sketched(p, frame_progress_ms(p) - start, true);
     return true;
 }
 
-/* Somebody looks, and there are several lights, or faces of one: SKETCH_SAMPLES of each come first,
- * or there would be nothing to see before the last is at work. */
-static bool sketch(struct frame *f, struct pen_error *error)
+/* The time was up in the midst of a light that there is a sketch of; those after it have theirs. */
+static bool fall_back(struct frame *f, uint32_t light, struct pen_error *error)
 {
-    struct pen_request *r = f->job->request;
-    const struct pen_param *row = pen_param_find(f->job->technique->info.params, "samples");
-    const double few = SKETCH_SAMPLES;
-    uint32_t asked = 0, units = 0, params[PEN_TECHNIQUE_PARAM_BYTES / 4];
-    for (uint32_t i = 0; i < f->light_count; i++)
-        units += f->lights[i].face_count;
-    if (row)
-        memcpy(&asked, (const char *)r->technique_params + row->offset, sizeof asked);
-    if (units < 2 || !f->progress.tracked || asked < 4 * SKETCH_SAMPLES)
-        return true;
-    struct pen_result before = *f->result;
-    memcpy(params, r->technique_params, sizeof params);
-    pen_param_store(row, r->technique_params, &few, "", NULL);
-    f->sketching = true;
-    f->sketched = sketch_lights(f, error);
-    f->sketching = false;
-    memcpy(before.completed.technique_params, params, sizeof params);
-    *f->result = before; /* it counts nothing */
-    frame_progress_sketch(&f->progress, units, SKETCH_SAMPLES);
-    return f->sketched;
+    struct technique_turns *turns = &f->job->ctx->turns;
+    bool is;
+    if (!turns->stopped)
+        return false;
+    turns->stopped = false;
+    f->progress.stopped = true;
+    frame_progress_sketched(&f->progress, 0, false);
+    *error = (struct pen_error){0};
+    return sketch(f, light, light + 1, &is, error);
 }
 
 /* The sky's shadow of this jittered frame. */
@@ -297,16 +294,15 @@ static bool record_visibility(struct frame *f, struct pen_error *error)
     /* What is left to do after the samples is to be small. */
     if (frame_progress_is_limited(&f->progress) && !know_sky(f, error))
         return false;
-    if (f->number == 0)
-        f->progress.ahead_ms = f->progress.step_ms = frame_progress_ms(&f->progress);
-    if (f->number == 0 && !sketch(f, error))
+    if (f->number == 0 && !begin(f, error))
         return false;
     upload_params(f);
     for (uint32_t i = 0; i < f->light_count && !f->progress.stopped; i++) {
         aim_light(f, i);
-        if (!record_light(f, i, &uncounted, error))
+        if (!record_light(f, i, &uncounted, error) && !fall_back(f, i, error))
             return false;
     }
+    frame_progress_sketched(&f->progress, 0, false);
     f->sketched = false;
     if (frame_is_layered(job)) {
         bool ok = !uncounted || frame_layers_count_now(job, f->gbuffer, &receivers, error);
@@ -442,7 +438,7 @@ static bool render_jittered(struct frame *f, uint32_t number, struct pen_error *
     bool layered = frame_is_layered(job), beauty = frame_needs(r, PEN_SOURCE_BEAUTY);
     struct gbuffer *g = layered ? &job->targets->layer : &job->targets->gbuffer;
     f->number = job->ctx->turns.frame = number;
-    upload_view(f, number);
+    frame_output_aim(job, &f->view, number);
     if (layered && !render_layers(f, error))
         return false;
     if (layered && r->output.layer != PEN_LAYER_ALL)
@@ -579,7 +575,10 @@ bool frame_render(const struct frame_job *job, struct pen_frame *frame, struct p
     if (!frame_output_read(job, &f.view, f.progress.frames + !f.progress.frames, frame, error))
         goto done;
     frame_progress_tell(&f.progress, result);
-    if (f.progress.stopped)
+    if (f.progress.stopped && !result->progress.done)
+        pen_result_warn(result, "Its time was up: the shadows are a sketch (%s at most).",
+            job->technique->sketch);
+    else if (f.progress.stopped)
         pen_result_warn(result, "Its time was up: the picture rests on %u of %u samples.",
             result->progress.done, result->progress.total);
     frame_layers_end(job, &f.work, f.classified, result);

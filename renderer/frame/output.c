@@ -10,6 +10,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#define SHARED_ROWS "renderer/shaders/frame/view.def"
+#include "renderer/shared/rows_c.h"
+
 static enum pen_pixel pixel_of(const struct pen_output *output, uint32_t layer)
 {
     /* Half floats would cut metres to three digits. */
@@ -193,4 +196,35 @@ uint64_t frame_output_estimate(const struct pen_request *r, uint32_t lights, boo
     bytes += frame_needs(r, PEN_SOURCE_CLASSES) ? 4 : 0;
     bytes += frame_needs(r, PEN_SOURCE_VARIANCE) ? 4 : 0;
     return bytes * r->width * r->height;
+}
+
+void frame_output_aim(const struct frame_job *job, const struct view *v, uint32_t number)
+{
+    const struct pen_request *r = job->request;
+    struct view_block b = {0};
+    memcpy(b.world_to_clip, v->world_to_clip, sizeof b.world_to_clip);
+    memcpy(b.clip_to_world, v->clip_to_world, sizeof b.clip_to_world);
+    memcpy(b.eye, v->eye, 12);
+    b.eye[3] = 0.5f * (float)r->height / tanf(0.5f * v->fov_y_rad);
+    memcpy(b.forward, v->forward, 12);
+    b.forward[3] = v->near_z;
+    b.viewport[0] = (float)r->width, b.viewport[1] = (float)r->height;
+    b.viewport[2] = 1 / b.viewport[0], b.viewport[3] = 1 / b.viewport[1];
+    memcpy(b.ambient, r->ambient, 12);
+    if (r->background[0] != PEN_AUTO && !pen_request_is_transparent(r))
+        memcpy(b.background, r->background, 12);
+    memcpy(b.ground_albedo, r->ground_albedo, 12);
+    float center[3], radius = scene_radius(job->scene);
+    scene_center(job->scene, center);
+    bool empty = scene_is_empty(job->scene);
+    b.ground[0] = center[0], b.ground[2] = center[2];
+    /* A hair below the bounds, so that a floor of the scene itself hides it. */
+    b.ground[1] = (empty ? 0 : scene_floor(job->scene)) - 1e-4f * radius;
+    b.ground[3] = 12 * radius;
+    b.display[0] = exp2f(r->exposure_ev);
+    b.display[1] = (float)r->tone_map;
+    b.display[2] = (float)number;
+    b.display[3] = 1 / (float)r->antialias;
+    gl.NamedBufferData(job->ctx->view_block, sizeof b, &b, GL_STREAM_DRAW);
+    gl.BindBufferBase(GL_UNIFORM_BUFFER, UBO_VIEW, job->ctx->view_block);
 }

@@ -3,6 +3,7 @@
 #include "renderer/passes/draw/kept_sums.h"
 #include "renderer/passes/draw/screen.h"
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 
 #define SHARED_ROWS "renderer/shaders/frame/progress.def"
@@ -74,6 +75,35 @@ static enum technique_step step(struct frame_progress *p, uint32_t samples)
     p->show_wanted = viewer->wants && viewer->wants(viewer->context);
     bool compare = p->tracked && samples >= 2 * p->kept_done;
     return p->show_wanted || compare ? STEP_SHOW : STEP_GO_ON;
+}
+
+bool frame_progress_lower(const struct technique *technique, uint32_t *params)
+{
+    bool lowered = false;
+    char name[32], value[32];
+    int length = 0;
+    for (const char *at = technique->sketch;
+         at && sscanf(at, " %31[^=]=%31s%n", name, value, &length) == 2; at += length) {
+        const struct pen_param *row = pen_param_find(technique->info.params, name);
+        double most = strtod(value, NULL);
+        if (row && pen_param_load(row, params, 0) > most)
+            lowered |= pen_param_store(row, params, &most, "", NULL);
+    }
+    return lowered;
+}
+
+void frame_progress_sketched(struct frame_progress *p, double sketch_ms, bool on)
+{
+    struct technique_turns *turns = &p->job->ctx->turns;
+    double now = frame_progress_ms(p), wall = gl_now_ms();
+    double ahead = 1.2 * p->ahead_ms + 1.5 * sketch_ms, first = 1e-9;
+    double others = fmax((wall - p->begun_ms) / fmax(now, 1e-3), 1);
+    turns->stop_ms = turns->stop_used_ms = 0;
+    p->begun |= on;
+    if (on && p->job->budget_ms > 0)
+        turns->stop_used_ms = fmax(p->job->budget_ms - ahead, first);
+    if (on && p->job->until_ms > 0)
+        turns->stop_ms = fmax(p->job->until_ms - ahead * others, first);
 }
 
 void frame_progress_sketch(struct frame_progress *p, uint32_t units, uint32_t samples)

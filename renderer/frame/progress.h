@@ -33,6 +33,10 @@ void frame_progress_begin(
 bool frame_progress_is_limited(const struct frame_progress *p);
 /* Of each of so many lights or faces of one there are a few samples. */
 void frame_progress_sketch(struct frame_progress *p, uint32_t units, uint32_t samples);
+/* Sets a method's parameters to those of its sketch; false: they already are, or it has none. */
+bool frame_progress_lower(const struct technique *technique, uint32_t *params);
+/* There is such a sketch. Until `on` is false passes fail when the time is up (turns.stopped). */
+void frame_progress_sketched(struct frame_progress *p, double sketch_ms, bool on);
 /* What is to be done with an estimate from `done` of `total` samples of light or face `unit` of the
  * frame at hand. */
 enum technique_step frame_progress_step(

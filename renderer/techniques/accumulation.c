@@ -84,6 +84,7 @@ const struct technique technique_accumulation = {
         .struct_size = sizeof(struct accumulation),
         .params = {rows, sizeof rows / sizeof *rows}},
     .state_size = sizeof(struct accumulation_state),
+    .sketch = "map_size=256 kernel=4",
     .record = record,
     .destroy = destroy,
 };

@@ -143,6 +143,7 @@ const struct technique technique_adaptive = {
         .params = {rows, sizeof rows / sizeof *rows}},
     .state_size = sizeof(struct state),
     .create = create,
+    .sketch = "map_size=512 pcf_search_taps=4 pcf_taps=8",
     .record = record,
     .finish = finish,
     .destroy = destroy,

@@ -435,6 +435,7 @@ const struct technique technique_adaptive_sampling = {
         .params = {rows, sizeof rows / sizeof *rows}},
     .state_size = sizeof(struct state),
     .create = create,
+    .sketch = "levels=0 min_level=0 map_size=256",
     .record = record,
     .destroy = destroy,
 };

@@ -58,5 +58,6 @@ const struct technique technique_backprojection = {
         .candidates = PEN_CANDIDATES(""),
         .struct_size = sizeof(struct backprojection),
         .params = {rows, sizeof rows / sizeof *rows}},
+    .sketch = "map_size=256",
     .record = record,
 };

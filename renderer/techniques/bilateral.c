@@ -47,5 +47,6 @@ const struct technique technique_bilateral = {
         .struct_size = sizeof(struct bilateral),
         .params = {rows, sizeof rows / sizeof *rows}},
     .counts_horizon = true,
+    .sketch = "samples=4 map_size=256 search_taps=4",
     .record = record,
 };

@@ -110,6 +110,7 @@ const struct technique technique_bitmask = {
         .struct_size = sizeof(struct bitmask),
         .params = {rows, sizeof rows / sizeof *rows}},
     .state_size = sizeof(struct bitmask_state),
+    .sketch = "map_size=256",
     .record = record,
     .destroy = destroy,
 };

@@ -305,6 +305,7 @@ const struct technique technique_cascaded = {
         .struct_size = sizeof(struct cascaded),
         .params = {rows, sizeof rows / sizeof *rows}},
     .state_size = sizeof(struct state),
+    .sketch = "near_side=2 middle_side=2 near_map_size=256 middle_map_size=256",
     .record = record,
     .destroy = destroy,
 };

@@ -48,5 +48,6 @@ const struct technique technique_csm = {
         .textured = false,
         .struct_size = sizeof(struct csm),
         .params = {rows, sizeof rows / sizeof *rows}},
+    .sketch = "map_size=256",
     .record = record,
 };

@@ -47,5 +47,6 @@ const struct technique technique_cssm = {
         .textured = false,
         .struct_size = sizeof(struct cssm),
         .params = {rows, sizeof rows / sizeof *rows}},
+    .sketch = "map_size=256",
     .record = record,
 };

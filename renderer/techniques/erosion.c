@@ -323,6 +323,7 @@ const struct technique technique_erosion = {
         .struct_size = sizeof(struct erosion),
         .params = {rows, sizeof rows / sizeof *rows}},
     .state_size = sizeof(struct state),
+    .sketch = "map_size=512 filter_taps=8 max_radius=32",
     .record = record,
     .destroy = destroy,
 };

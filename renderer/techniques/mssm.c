@@ -61,5 +61,6 @@ const struct technique technique_mssm = {
         .candidates = PEN_CANDIDATES(""),
         .struct_size = sizeof(struct mssm),
         .params = {rows, sizeof rows / sizeof *rows}},
+    .sketch = "map_size=256",
     .record = record,
 };

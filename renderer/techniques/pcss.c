@@ -62,5 +62,6 @@ const struct technique technique_pcss = {
         .candidates = PEN_CANDIDATES("", "search_taps=32 filter_taps=64"),
         .struct_size = sizeof(struct pcss),
         .params = {rows, sizeof rows / sizeof *rows}},
+    .sketch = "map_size=512 search_taps=4 filter_taps=8",
     .record = record,
 };

@@ -42,5 +42,6 @@ const struct technique technique_screen_space = {
         .textured = false,
         .struct_size = sizeof(struct screen_space),
         .params = {rows, sizeof rows / sizeof *rows}},
+    .sketch = "map_size=512 search_taps=4 filter_taps=4",
     .record = record,
 };

@@ -53,5 +53,6 @@ const struct technique technique_stochastic = {
         .struct_size = sizeof(struct stochastic),
         .params = {rows, sizeof rows / sizeof *rows}},
     .counts_horizon = true,
+    .sketch = "maps=4 samples=4 map_size=256",
     .record = record,
 };

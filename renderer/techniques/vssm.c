@@ -76,5 +76,6 @@ const struct technique technique_vssm = {
         .candidates = PEN_CANDIDATES(""),
         .struct_size = sizeof(struct vssm),
         .params = {rows, sizeof rows / sizeof *rows}},
+    .sketch = "map_size=256",
     .record = record,
 };

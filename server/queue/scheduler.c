@@ -474,8 +474,10 @@ void scheduler_finish(struct scheduler *s, struct render *render, const struct o
     bool ok = answer.error.code == PEN_OK, given_up = answer.error.code == PEN_LOST;
     if (ok)
         s->mean_ms += 0.1 * (ms - s->mean_ms);
-    /* What was there already cost nothing. */
-    if ((ok || given_up) && !(outcome->result && outcome->result->progress.kept))
+    /* What was there already cost nothing, and a sketch tells nothing of the whole. */
+    const struct pen_progress *progress = outcome->result ? &outcome->result->progress : NULL;
+    bool tells = !progress || (!progress->kept && (!ok || progress->done || !progress->total));
+    if ((ok || given_up) && tells)
         estimates_learn(s->estimates, &render->request, ms / picture_share(outcome->result), ok,
             s->limits.now_ns());
     settle(s, render, ms);

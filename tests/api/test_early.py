@@ -71,11 +71,23 @@ class Early(unittest.TestCase):
 
     def test_frames(self):
         """Whole jittered frames are what a method can be left after that takes its samples at once."""
-        request = dict(SIZE, technique="pcss", antialias=64, budget_ms=1)
+        request = dict(SIZE, technique="hard", antialias=64, budget_ms=1)
         progress = self.record(request)["progress"]
         self.assertEqual(progress["of"], 64)
         self.assertGreaterEqual(progress["samples"], 1)
         self.assertLess(progress["samples"], 64)
+
+    def test_sketch(self):
+        """What takes its samples at once and cannot have them has cheaper shadows, and says so."""
+        request = dict(SIZE, technique="stochastic", budget_ms=1)
+        record = self.record(request)
+        self.assertEqual((record["progress"]["samples"], record["progress"]["of"]), (0, 1))
+        self.assertIn("sketch", " ".join(record["warnings"]))
+        self.assertEqual(record["request"]["technique"]["params"]["maps"], 32)
+        self.assertEqual(self.d.render(self.scene, request).headers["Cache-Control"], "no-store")
+        whole = self.record(dict(request, budget_ms=3600000))
+        self.assertEqual(whole["progress"]["samples"], 1)
+        self.assertFalse([w for w in whole["warnings"] if "sketch" in w])
 
     def test_is_nobody_elses(self):
         """What ended early is not kept for the request, and who asks for all gets all."""

@@ -35,9 +35,19 @@ static bool is_whole(const struct technique_turns *turns)
     return !turns->fiber || turns->held || isinf(turns->most_ms);
 }
 
+static bool is_time_up(const struct technique_turns *turns)
+{
+    double now = gl_now_ms(), used = turns->used_ms + now - turns->since_ms;
+    return (turns->stop_ms > 0 && now > turns->stop_ms) ||
+           (turns->stop_used_ms > 0 && used > turns->stop_used_ms);
+}
+
 bool pass_turn(struct technique_ctx *ctx, struct pen_error *error)
 {
     struct technique_turns *turns = &ctx->turns;
+    turns->stopped |= !turns->held && is_time_up(turns);
+    if (turns->stopped)
+        return pen_fail(error, PEN_DEADLINE, "/deadline_ms", "The image's time is up.");
     if (is_whole(turns))
         return true;
     follow_device(ctx);

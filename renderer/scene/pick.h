@@ -11,9 +11,11 @@ struct pick_tiles {
                               above 1: nothing is */
 };
 
-struct picked {
-    uint32_t *indices; /* freed by the caller */
+struct picked { /* zeroed to begin with */
+    uint32_t *indices;
     size_t count, room;
+    struct pick_corner *corners; /* vertices on the screen, of the instance at hand */
+    size_t corner_room;
 };
 
 /* Of the commands from `first` on, which are of one instance, leaves one at most: of the triangles
@@ -21,3 +23,4 @@ struct picked {
 void pick_triangles(const struct pick_tiles *tiles, const mat4 world_to_clip,
     const struct psc_scene *blob, struct cull_command *commands, uint32_t first, uint32_t *count,
     struct picked *picked);
+void pick_finish(struct picked *picked);

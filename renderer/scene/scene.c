@@ -542,7 +542,7 @@ uint64_t scene_draw(struct scene *s, const struct cull_view *view, const struct 
         use_indices(s, s->indices);
     gl.DeleteBuffers(1, &own);
 done:
-    free(picked.indices);
+    pick_finish(&picked);
     free(runs);
     return triangles;
 }

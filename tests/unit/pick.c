@@ -78,7 +78,7 @@ static bool is_wanted(mat4 world_to_clip, const float world[12], const float (*c
 
 int main(void)
 {
-    static float positions[3 * TRIANGLES][3], farthest[DOWN * ACROSS];
+    static float positions[5 + 3 * TRIANGLES][3], farthest[DOWN * ACROSS];
     static uint32_t indices[3 * TRIANGLES];
     uint32_t needed = 0, kept = 0;
     for (int round = 0; round < 200; round++) {
@@ -90,13 +90,16 @@ int main(void)
             for (int k = 0; k < 3; k++)
                 center[k] = uniform(-3, 3);
             for (uint32_t c = 0; c < 3; c++) {
-                indices[3 * i + c] = 3 * ((i * 7) % TRIANGLES) + c;
+                indices[3 * i + c] = 5 + 3 * ((i * 7) % TRIANGLES) + c;
                 for (int k = 0; k < 3; k++)
                     positions[indices[3 * i + c]][k] = (float)(center[k] + uniform(-size, size));
             }
         }
-        struct psc_scene scene = {
-            .instances = &instance, .positions = (const float(*)[3])positions, .indices = indices};
+        struct psc_primitive primitive = {.first_vertex = 5, .vertex_count = 3 * TRIANGLES};
+        struct psc_scene scene = {.primitives = &primitive,
+            .instances = &instance,
+            .positions = (const float(*)[3])positions,
+            .indices = indices};
         struct pick_tiles tiles = {
             ACROSS, DOWN, (float)WIDTH / TILE, (float)HEIGHT / TILE, farthest};
         struct cull_command commands[] = {

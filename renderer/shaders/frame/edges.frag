@@ -102,10 +102,10 @@ void main()
     color = alone(texelFetch(picture, pixel, 0));
 #ifndef ALONE
     // Loops, since software rasterisers leave them out where no pixel needs them.
-    int around = may_show_edge(pixel, last) ? 9 : 0;
+    int around = may_show_edge(pixel, last) ? 8 : 0;
     vec3 right = vec3(0.0), up = vec3(0.0);
-    vec4 depths = vec4(0.0), front = vec4(0.0), open = vec4(0.0);
-    for (int once = 0; once < around; once += 9) {
+    vec4 depths = vec4(0.0), front = vec4(0.0), own = vec4(0.0), open = vec4(0.0);
+    for (int once = 0; once < around; once += 8) {
         right = normalize(cross(view.forward.xyz,
             vec3(view.world_to_clip[0].y, view.world_to_clip[1].y, view.world_to_clip[2].y)));
         up = cross(right, view.forward.xyz);
@@ -116,23 +116,23 @@ void main()
             front[i] = max(depths[i], texelFetch(front_places, pixel - ivec2(0, edge.rows.x), i).r);
 #endif
         // 0 where the pixel's own plane explains the place.
-        vec4 own = match_both(planes_at(pixel, right, up), depths, front, vec2(0.0));
+        own = match_both(planes_at(pixel, right, up), depths, front, vec2(0.0));
         open = clamp(4.0 - 0.6 * own, 0.0, 1.0);
-        around = any(greaterThan(open, vec4(0.0))) ? 9 : 0;
+        around = any(greaterThan(open, vec4(0.0))) ? 8 : 0;
     }
-    vec4 sums[EDGE_PLACES], weights = vec4(0.0);
+    vec4 sums[EDGE_PLACES], weights = own, own_light = light_of(texelFetch(picture, pixel, 0));
     for (int i = 0; i < EDGE_PLACES; i++)
-        sums[i] = vec4(0.0);
+        sums[i] = own[i] * own_light;
     for (int k = 0; k < around; k++) {
-        ivec2 at = clamp(pixel + ivec2(k % 3, k / 3) - 1, ivec2(0), last);
-        vec4 weight = match_both(planes_at(at, right, up), depths, front, vec2(at - pixel));
-        weight *= k == 4 ? vec4(1.0) : open;
+        int other = k < 4 ? k : k + 1; // of 3 x 3, without the middle
+        ivec2 at = clamp(pixel + ivec2(other % 3, other / 3) - 1, ivec2(0), last);
+        vec4 weight = open * match_both(planes_at(at, right, up), depths, front, vec2(at - pixel));
         weights += weight;
         vec4 light = light_of(texelFetch(picture, at, 0));
         for (int i = 0; i < EDGE_PLACES; i++)
             sums[i] += weight[i] * light;
     }
-    for (int once = 0; once < around; once += 9) {
+    for (int once = 0; once < around; once += 8) {
         vec4 light = vec4(0.0);
         for (int i = 0; i < EDGE_PLACES; i++)
             light += sums[i] / (weights[i] * float(EDGE_PLACES));

@@ -54,6 +54,28 @@ static bool is_time_up(const struct frame_progress *p, double now)
            (job->until_ms > 0 && wall + ahead * fmax(others, 1) > job->until_ms);
 }
 
+/* Lights, or faces of one, have unlike numbers of samples. */
+static bool are_apart(const struct frame_progress *p)
+{
+    return p->units && !p->frames;
+}
+
+/* Units are sampled independently: variances of the mean add up. What is not known of one is taken
+ * for the worst of the others. */
+static float combine(const struct frame_progress *p)
+{
+    double worst = 0, sum = 0;
+    for (uint32_t i = 0; i < p->units; i++)
+        worst = fmax(worst, p->unit_squares[i]);
+    for (uint32_t i = 0; i < p->units; i++) {
+        bool whole = p->frames || i < p->unit;
+        double samples = whole ? p->total : i == p->unit ? fmax(p->own, p->sketched) : p->sketched;
+        double square = p->unit_squares[i];
+        sum += (square > 0 ? square : worst) / samples;
+    }
+    return worst > 0 ? (float)sqrt(sum) : -1;
+}
+
 /* An estimate of so many samples in all. */
 static enum technique_step step(struct frame_progress *p, uint32_t samples)
 {
@@ -73,7 +95,9 @@ static enum technique_step step(struct frame_progress *p, uint32_t samples)
     if (!first && p->extra_ms + p->last_extra_ms > share * now)
         return STEP_GO_ON;
     p->show_wanted = viewer->wants && viewer->wants(viewer->context);
-    bool compare = p->tracked && samples >= 2 * p->kept_done;
+    bool more = are_apart(p) ? p->kept_unit != p->unit || p->own >= 2 * p->kept_own
+                             : samples >= 2 * p->kept_done;
+    bool compare = p->tracked && more;
     return p->show_wanted || compare ? STEP_SHOW : STEP_GO_ON;
 }
 
@@ -117,14 +141,21 @@ enum technique_step frame_progress_step(
 {
     p->total = total;
     p->done = done;
+    p->unit = unit;
+    p->own = done;
     if (p->units) {
         double sum = (double)unit * total + fmax(done, p->sketched) +
                      (double)(p->units - unit - 1) * p->sketched;
         p->done = (uint32_t)(sum / p->units);
     }
     /* What there was of this light before was better. */
-    if (done == total || done < p->sketched)
+    if (done < p->sketched)
         return STEP_GO_ON;
+    if (done == total) {
+        /* What the next one is compared with. */
+        p->show_wanted = false;
+        return p->tracked && are_apart(p) && unit + 1 < p->units ? STEP_SHOW : STEP_GO_ON;
+    }
     return step(p, p->frames * total + p->done);
 }
 
@@ -134,6 +165,10 @@ enum technique_step frame_progress_next(struct frame_progress *p)
         return STEP_STOP;
     p->frames++;
     p->done = 0;
+    if (p->units && p->frames == 1) {
+        p->standard_error = combine(p);
+        p->kept_done = 0;
+    }
     return p->frames < p->job->request->antialias ? step(p, p->frames * p->total) : STEP_GO_ON;
 }
 
@@ -163,7 +198,8 @@ static bool draw(const struct frame_progress *p, uint32_t to, const struct pass_
  * variance s^2 (1/n - 1/m), and the later itself s^2 / m: two batch means (W. Cochran, Sampling
  * Techniques, 3rd ed., section 2.15: two random groups). Nets do better than independent samples, so
  * that this errs on the side of too large. */
-static bool estimate(struct frame_progress *p, struct pen_error *error)
+static bool estimate(
+    struct frame_progress *p, uint32_t kept, uint32_t samples, struct pen_error *error)
 {
     const struct pen_request *r = p->job->request;
     struct frame_targets *t = p->job->targets;
@@ -187,8 +223,12 @@ static bool estimate(struct frame_progress *p, struct pen_error *error)
         pixels += (double)sums[2 * i + 1];
     }
     free(sums);
-    double share = (double)p->kept_done / (p->now_done - p->kept_done);
-    p->standard_error = pixels > 0 ? (float)sqrt(squares / pixels * share) : 0;
+    double share = (double)kept / (samples - kept);
+    double square = pixels > 0 ? squares / pixels * share : 0;
+    if (are_apart(p))
+        p->unit_squares[p->unit] = square * samples;
+    else
+        p->standard_error = (float)sqrt(square);
     return true;
 }
 
@@ -197,8 +237,15 @@ bool frame_progress_compare(struct frame_progress *p, struct pen_error *error)
     const struct pen_request *r = p->job->request;
     struct frame_targets *t = p->job->targets;
     uint32_t samples = p->frames * p->total + p->done, next = 0;
+    bool apart = are_apart(p);
     if (samples == p->now_done)
         return true;
+    if (apart && p->kept_done && p->kept_unit != p->unit) {
+        p->kept = p->now;
+        p->kept_done = p->now_done;
+        p->kept_own = p->sketched;
+        p->kept_unit = p->unit;
+    }
     while ((p->now_done && next == p->now) || (p->kept_done && next == p->kept))
         next++;
     gl_target_fit(&t->means[next], GL_R32F, r->width, r->height, 0, 1);
@@ -212,11 +259,14 @@ bool frame_progress_compare(struct frame_progress *p, struct pen_error *error)
         return false;
     p->now = next;
     p->now_done = samples;
-    if (p->kept_done && !estimate(p, error))
+    uint32_t own = apart ? p->own : samples, kept = apart ? p->kept_own : p->kept_done;
+    if (p->kept_done && own > kept && !estimate(p, kept, own, error))
         return false;
-    if (samples >= 2 * p->kept_done) {
+    if (!p->kept_done || own >= 2 * kept) {
         p->kept = p->now;
         p->kept_done = samples;
+        p->kept_own = own;
+        p->kept_unit = p->unit;
     }
     return true;
 }
@@ -228,7 +278,6 @@ void frame_progress_tell(struct frame_progress *p, struct pen_result *result)
         .done = p->frames * p->total + p->done,
         .total = total,
         .kept = p->faces ? (uint32_t)(kept_sums_taken(p->job->sums) / p->faces) : 0,
-        /* Lights of unlike numbers of samples: what moves least may be what is farthest off. */
-        .standard_error = p->units ? -1 : p->standard_error,
+        .standard_error = are_apart(p) ? combine(p) : p->standard_error,
         .elapsed_ms = (float)(gl_now_ms() - p->begun_ms)};
 }

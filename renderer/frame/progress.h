@@ -3,6 +3,8 @@
 #pragma once
 #include "renderer/frame/job.h"
 
+#define PROGRESS_UNITS (PEN_MAX_LIGHTS * 6) /* faces of lights */
+
 struct frame_progress {
     const struct frame_job *job;
     uint32_t lights, faces;   /* of all lights together */
@@ -20,9 +22,13 @@ struct frame_progress {
     uint32_t frames;          /* jittered ones that are complete */
     uint32_t done, total;     /* samples of the frame at hand, the mean of its lights */
     uint32_t units, sketched; /* see frame_progress_sketch; 0: none */
+    uint32_t unit, own;       /* the one at hand, and its samples */
+    /* Of each unit, the variance of one sample, which the mean visibility has of it; 0: not known. */
+    double unit_squares[PROGRESS_UNITS];
     /* The mean visibility after so many samples, in targets->means[]: as it is now, and an earlier
      * one to compare it with. */
     uint32_t now, now_done, kept, kept_done; /* done 0: none */
+    uint32_t kept_unit, kept_own;            /* which unit's samples it lacks, and has */
     float standard_error;                    /* < 0: not estimated */
     bool show_wanted;
 };

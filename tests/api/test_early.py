@@ -128,6 +128,14 @@ class Early(unittest.TestCase):
         self.assertEqual(early["taken_over"], 64)
         self.assertEqual(late["taken_over"], early["samples"])
 
+    def test_error_of_several_lights(self):
+        lights = [{"type": "rect", "position": [x, 3, 1], "target": [0, 0, 0]} for x in (-2, 2)]
+        request = dict(RAYS, lights=lights, budget_ms=3600000)
+        progress = self.record(request)["progress"]
+        self.assertEqual(progress["samples"], 1024)
+        self.assertGreater(progress["standard_error"], 0)
+        self.assertLess(progress["standard_error"], 0.1)
+
     def test_deadline(self):
         """The endless one has a picture long before, and no end."""
         late = dict(ENDLESS, deadline_ms=int(4000 * PATIENCE), on_deadline="best")

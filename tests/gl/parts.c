@@ -163,6 +163,8 @@ int main(void)
             request.lights[k].position[2] = 1;
         }
         check_watching(r, &request);
+        request.output.layer = PEN_LAYER_VISIBILITY; /* their errors add up */
+        check_falling(r, &request);
     }
     for (int i = 0; i < 3; i++) {
         make_request(&request, scene, names[i ? 1 : 0], 1);

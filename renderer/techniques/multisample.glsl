@@ -2,13 +2,20 @@
 #include "sample_maps.glsl"
 #include "multisample.def"
 layout(binding = UNIT_SAMPLE_MAPS) uniform sampler2DArray maps;
+#ifdef SOME
+layout(binding = UNIT_SOURCE) uniform sampler2D counts; // x: samples that a pixel has
+#endif
 
 vec4 visibility(Surface s)
 {
     vec2 size = vec2(textureSize(maps, 0).xy);
     SampledReceiver r = sampled_receiver(s, P(bias));
     vec4 sum = vec4(0.0);
-    for (int i = 0; i < lookup.count.x; i++) {
+    int count = lookup.count.x;
+#ifdef SOME
+    count = texelFetch(counts, s.pixel, 0).x < lookup.weight.y ? count : 0;
+#endif
+    for (int i = 0; i < count; i++) {
         SampleMap map = lookup.samples[i];
         SampleView v = sample_view(r, map.at.xy);
         float lit = sample_lit(maps, size, map, r, v);

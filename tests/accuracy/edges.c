@@ -158,6 +158,9 @@ int main(int argc, char **argv)
     check_scene("columns", id, "sky=on", 0.5);
     harness_scene(&(struct pen_generated_options){.kind = PEN_GENERATED_HAIRBALL}, id);
     check_scene("hairball", id, "sky=on", 0.5);
+    harness_scene(
+        &(struct pen_generated_options){.kind = PEN_GENERATED_FOLIAGE, .triangles = 4000}, id);
+    check_scene("leaves cut out by alpha", id, "sky=on", 0.5);
     check_panes();
     CHECK_DONE();
 }

@@ -1,6 +1,5 @@
-// Which of the places in a pixel a surface covers. ALPHA: its material cuts holes; alpha is read
-// once per pixel and carried on to the places along its gradient. SOLID: only what hides what is
-// behind it.
+// Which of the places in a pixel a surface covers. ALPHA: its material cuts holes, and its
+// texture is read at each. SOLID: only what hides what is behind it.
 #ifdef ALPHA
 #include "material.glsl"
 #include "edges.def"
@@ -19,13 +18,13 @@ flat in uint v_material;
 void main()
 {
 #ifdef ALPHA
-    float alpha = material_base(v_material, v_uv, v_color).a;
-    vec2 slope = vec2(dFdx(alpha), dFdy(alpha));
+    vec4 across = dFdx(v_uv), down = dFdy(v_uv);
     int covered = 0;
-    for (int i = 0; i < EDGE_PLACES; i++)
-        if (!alpha_is_cut(
-                v_material, alpha + dot(slope, vec2(edge.across[i], edge.down[i])), THRESHOLD))
+    for (int i = 0; i < EDGE_PLACES; i++) {
+        vec4 uv = v_uv + edge.across[i] * across + edge.down[i] * down;
+        if (!alpha_is_cut(v_material, material_base(v_material, uv, v_color).a, THRESHOLD))
             covered |= 1 << i;
+    }
     gl_SampleMask[0] = covered;
 #endif
 }

@@ -125,7 +125,8 @@ static void check_falling(struct pen_renderer *r, const struct pen_request *requ
         double off = distance(&parts.frames[i], &last) / 255;
         printf("%s: %u of %u, off %.4f, estimate %.4f\n", request->technique, progress->done,
             progress->total, off, (double)progress->standard_error);
-        CHECK(off < before);
+        /* A face of a light may show little of the picture: within noise. */
+        CHECK(off < (request->light_count > 1 ? 1.02 : 1) * before);
         before = off;
         /* A random variable of few degrees of freedom, and over the ground's far part, too. */
         CHECK(i == 0 || (progress->standard_error > off / 4 && progress->standard_error < 8 * off));

@@ -23,12 +23,22 @@ vec2 material_uv(uint material, int slot, vec4 uv)
 // Samples with explicit derivatives: llvmpipe reads zeros from a buffer in the pixels of a 2 x 2
 // block that the triangle does not cover, and implicit derivatives of coordinates that were
 // transformed with them pick a wrong level along every edge.
-vec4 material_sample(sampler2D map, uint material, int slot, vec4 uv)
+struct Footprint {
+    vec2 at, across, down; // in the texture; per pixel
+};
+
+Footprint material_footprint(uint material, int slot, vec4 uv)
 {
     vec4 dx = dFdx(uv), dy = dFdy(uv);
     vec2 origin = material_uv(material, slot, vec4(0.0));
-    return textureGrad(map, material_uv(material, slot, uv),
-        material_uv(material, slot, dx) - origin, material_uv(material, slot, dy) - origin);
+    return Footprint(material_uv(material, slot, uv), material_uv(material, slot, dx) - origin,
+        material_uv(material, slot, dy) - origin);
+}
+
+vec4 material_sample(sampler2D map, uint material, int slot, vec4 uv)
+{
+    Footprint f = material_footprint(material, slot, uv);
+    return textureGrad(map, f.at, f.across, f.down);
 }
 
 // Base colour with vertex colour; the caller tests the alpha.

@@ -18,11 +18,14 @@ flat in uint v_material;
 void main()
 {
 #ifdef ALPHA
-    vec4 across = dFdx(v_uv), down = dFdy(v_uv);
+    Footprint f = material_footprint(v_material, SCENE_UNIT_BASE, v_uv);
+    bool textured = material_has(v_material, SCENE_UNIT_BASE);
+    float whole = materials[v_material].base_color.a * v_color.a;
     int covered = 0;
     for (int i = 0; i < EDGE_PLACES; i++) {
-        vec4 uv = v_uv + edge.across[i] * across + edge.down[i] * down;
-        if (!alpha_is_cut(v_material, material_base(v_material, uv, v_color).a, THRESHOLD))
+        vec2 at = f.at + edge.across[i] * f.across + edge.down[i] * f.down;
+        float alpha = textured ? whole * textureGrad(base_map, at, f.across, f.down).a : whole;
+        if (!alpha_is_cut(v_material, alpha, THRESHOLD))
             covered |= 1 << i;
     }
     gl_SampleMask[0] = covered;

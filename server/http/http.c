@@ -58,6 +58,21 @@ static bool is_token(const char *text, size_t bytes)
     return bytes > 0;
 }
 
+/* A value on a line of its own (RFC 9112, 5.2: refuse it). libmicrohttpd refuses those itself since
+ * 0.9.77; before, it joins the lines in a copy, so that the value no longer lies behind its name. */
+static bool is_folded(const char *name, size_t name_bytes, const char *value)
+{
+#if MHD_VERSION < 0x00097701
+    const char *after = name + name_bytes + 1;
+    while (after != value && (*after == ' ' || *after == '\t'))
+        after++;
+    return after != value;
+#else
+    (void)name, (void)name_bytes, (void)value;
+    return false;
+#endif
+}
+
 static enum MHD_Result look_at_header(void *context, enum MHD_ValueKind kind, const char *name,
     size_t name_bytes, const char *value, size_t value_bytes)
 {
@@ -66,6 +81,8 @@ static enum MHD_Result look_at_header(void *context, enum MHD_ValueKind kind, co
     f->count++;
     if (!is_token(name, name_bytes))
         f->fault = "A header has an invalid name.";
+    if (is_folded(name, name_bytes, value))
+        f->fault = "A header goes on in a second line.";
     for (size_t i = 0; i < value_bytes; i++)
         if (((unsigned char)value[i] < 0x20 && value[i] != '\t') || value[i] == 0x7f)
             f->fault = "A header has a control character in its value.";

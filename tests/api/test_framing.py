@@ -66,6 +66,25 @@ class Framing(unittest.TestCase):
                 not_a_number = headers.startswith(b"Content-Length: ") and headers.split()[1] != b"2"
                 self.one_refusal(post + headers + b"\r\n" + body, by_library=not_a_number)
 
+    def test_folded_lines(self):
+        post = b"POST /v1/scenes/%s/render HTTP/1.1\r\n" % self.id.encode() + HOST
+        for headers in (
+                b"Content-Length:\r\n 2\r\n",
+                b"Content-Length: \r\n\t2\r\n",
+                b"Content-Length: 2\r\n \r\n",
+                b"Content-Length: 1\r\n 2\r\n",
+                b"Transfer-Encoding:\r\n chunked\r\n",
+                b"X: a\r\n b\r\nContent-Length: 2\r\n",
+                b"X: a\r\n Content-Length: 2\r\n",
+                b"X:\r\n a\r\nContent-Length: 2\r\n"):
+            with self.subTest(headers=headers):
+                self.one_refusal(post + headers + b"\r\n{}" + SMUGGLED, by_library=True)
+        # What must not be taken for one: nothing, blanks before and behind.
+        for header in (b"X:\r\n", b"X: \r\n", b"X:a\r\n", b"X: \t a \t\r\n", b"X: a: b\r\n"):
+            got, _ = raw(self.d.port, b"GET /v1/techniques/none HTTP/1.1\r\n" + HOST + header +
+                         b"Connection: close\r\n\r\n", timeout=3)
+            self.assertIn(b" 200 ", got[:20], header)
+
     def test_body_where_none_belongs(self):
         for method in (b"GET", b"HEAD", b"DELETE"):
             with self.subTest(method=method):

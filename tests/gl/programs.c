@@ -149,6 +149,16 @@ static void check_either_way(struct pen_renderer *r, const struct pen_technique_
     specialise(info, as_written, 0);
 }
 
+/* Few light samples: it is the programs that are looked at, and 256 maps of a scene take minutes. */
+static void rows_request(
+    struct pen_request *request, const uint8_t *id, const struct pen_technique_info *info)
+{
+    small_request(request, id, info->name);
+    const struct pen_param *samples = pen_param_find(info->params, "samples");
+    if (samples && samples->def > 8)
+        set(request, samples, 8);
+}
+
 /* Every row as a constant and as a uniform, those that specialise at each of their choices: the same
  * picture. `only`: a method, or NULL for all. */
 static void check_rows(const char *only)
@@ -162,7 +172,7 @@ static void check_rows(const char *only)
         struct pen_request request;
         if (only && strcmp(only, info->name))
             continue;
-        small_request(&request, id, info->name);
+        rows_request(&request, id, info);
         if (info->params.count)
             check_either_way(r, info, &request, "defaults", true);
         for (uint32_t i = 0; i < info->params.count; i++) {
@@ -170,7 +180,7 @@ static void check_rows(const char *only)
             if (!row->specialise)
                 continue;
             for (int k = 0; row->choices ? row->choices[k] != NULL : k < 2; k++) {
-                small_request(&request, id, info->name);
+                rows_request(&request, id, info);
                 set(&request, row, k);
                 if (k != (int)row->def)
                     check_either_way(r, info, &request, row->name, false);

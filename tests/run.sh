@@ -79,7 +79,7 @@ finish() {
     exit $status
 }
 build() {
-    cmake --preset "$1" && cmake --build "build/$1" -j "$jobs"
+    cmake --preset "$1" && cmake --build "build/$1" -j "$jobs" --target "${2:-all}"
 }
 run_ctest() {
     local preset=$1 name=$2
@@ -121,12 +121,12 @@ elif later build-clang; then
     stage build-clang "$(left)" bash -c 'build clang' || true
 fi
 if later build-asan ctest-asan; then
-    stage build-asan "$(left)" bash -c 'build asan' &&
+    stage build-asan "$(left)" bash -c 'build asan unit_and_smoke' &&
         stage ctest-asan "$(left)" bash -c 'run_ctest asan ctest-asan "$@"' - "${asan[@]}" || true
     tests_not_run asan ctest-asan "${asan[@]}"
 fi
 if later build-tsan ctest-tsan; then
-    stage build-tsan "$(left)" bash -c 'build tsan' &&
+    stage build-tsan "$(left)" bash -c 'build tsan threaded' &&
         stage ctest-tsan "$(left)" bash -c 'run_ctest tsan ctest-tsan "$@"' - "${tsan[@]}" || true
     tests_not_run tsan ctest-tsan "${tsan[@]}"
 fi

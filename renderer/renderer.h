@@ -85,6 +85,10 @@ void pen_renderer_drop_shadows(struct pen_renderer *renderer);
 /* True when the GL context was lost; the worker then exits and is replaced. */
 bool pen_renderer_is_lost(struct pen_renderer *renderer);
 
-/* Compiles and runs what common requests need, on a small built-in scene, so that the first real
- * request is not slower than the tenth. Returns the milliseconds it took. */
-double pen_renderer_warm_up(struct pen_renderer *renderer);
+enum pen_warm_up {
+    PEN_WARM_USUAL, /* what a request needs that leaves everything out */
+    PEN_WARM_ALL    /* and every method with its defaults */
+};
+/* Compiles and runs programs in tiny pictures of built-in scenes, so that the first real request is
+ * not slower than the tenth. Returns the milliseconds it took. */
+double pen_renderer_warm_up(struct pen_renderer *renderer, enum pen_warm_up how_much);

@@ -308,16 +308,6 @@ struct scene *scene_create(const uint8_t id[PEN_ID_BYTES], int fd, struct pen_er
     return NULL;
 }
 
-struct scene *scene_create_memory(
-    const uint8_t id[PEN_ID_BYTES], const void *data, size_t bytes, struct pen_error *error)
-{
-    struct scene *s = create(id);
-    if (psc_open_memory(data, bytes, &s->file, error))
-        return open_file(s, error);
-    free(s);
-    return NULL;
-}
-
 void scene_attach(struct scene *scene, struct scene_attachment *attachment)
 {
     attachment->next = scene->attachments;

@@ -70,9 +70,6 @@ struct scene {
 
 /* Uploads the blob behind `fd`. Errors as psc_open; PEN_INTERNAL out of GPU memory. */
 struct scene *scene_create(const uint8_t id[PEN_ID_BYTES], int fd, struct pen_error *error);
-/* From memory that outlives the scene. */
-struct scene *scene_create_memory(
-    const uint8_t id[PEN_ID_BYTES], const void *data, size_t bytes, struct pen_error *error);
 void scene_destroy(struct scene *scene);
 
 void scene_attach(struct scene *scene, struct scene_attachment *attachment);

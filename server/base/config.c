@@ -50,7 +50,9 @@ static const struct row rows[] = {
     ROW(require_gpu, "off", .help = "Refuse to render in software."),
     ROW(gl_debug, "off", .help = "Write OpenGL's debug messages to the log."),
     ROW(warm_up, "on",
-        .help = "Compile what common requests need before the service says that it is ready."),
+        .help =
+            "Compile what the usual request needs before the service says that it is ready, and "
+            "the rest meanwhile."),
     ROW(gpu_memory, "2G", SIZE, .min = 1 << 20,
         .help = "Budget of each worker for scenes, images, shadow inputs and pictures being made."),
     ROW(workers, "1", .min = 1, .max = 16, .help = "Render processes: one per GPU."),

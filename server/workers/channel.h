@@ -10,8 +10,9 @@
 #define CHANNEL_WORKER_FD 3 /* the worker's end */
 #define CHANNEL_MAX_FDS (2 + PEN_MAX_LIGHTS)
 
-/* --warm-up N: when the worker compiles what common requests need. */
-enum worker_warm_up { WORKER_NO_WARM_UP, WORKER_WARM_UP_FIRST, WORKER_WARM_UP_IDLE };
+/* --warm-up N: what the worker compiles before it is asked for it. FILL: everything, into the driver's
+ * cache of compiled shaders; it then exits, and has no channel. */
+enum worker_warm_up { WORKER_NO_WARM_UP, WORKER_WARM_UP_USUAL, WORKER_WARM_UP_FILL };
 
 enum channel_kind {
     CHANNEL_HELLO = 1, /* worker: the context stands */

@@ -13,9 +13,9 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
-#define IDLE_BEFORE_WARM_UP_MS 10000 /* a replacement has work to catch up with first */
 #define TELL_TURN_MS 250
 #define EXIT_REFUSED 2
 #define EXIT_LOST 3
@@ -26,7 +26,6 @@ struct worker {
     struct worker_turns *turns;
     uint64_t told_job, told_ns; /* whose turn it is, as told last */
     struct worker_encoder *encoder;
-    enum worker_warm_up warm_up;      /* what is still to be done */
     struct channel_resident resident; /* as told last, most recently used first */
 };
 
@@ -41,10 +40,9 @@ static void warm_up(struct worker *worker)
     static struct channel_message message;
     message.version = CHANNEL_VERSION;
     message.kind = CHANNEL_WARM;
-    message.warm.warm_ms = (float)pen_renderer_warm_up(worker->renderer);
+    message.warm.warm_ms = (float)pen_renderer_warm_up(worker->renderer, PEN_WARM_USUAL);
     message.warm.gpu_bytes = pen_renderer_gpu_bytes(worker->renderer);
     message.warm.programs = pen_renderer_programs(worker->renderer);
-    worker->warm_up = WORKER_NO_WARM_UP;
     send_or_exit(&message);
 }
 
@@ -237,14 +235,7 @@ static int serve(struct worker *worker)
     for (;;) {
         bool busy = worker_turns_next(worker->turns) != 0;
         struct pollfd watch = {CHANNEL_WORKER_FD, POLLIN, 0};
-        int n = poll(&watch, 1,
-            busy                                     ? 0
-            : worker->warm_up == WORKER_WARM_UP_IDLE ? IDLE_BEFORE_WARM_UP_MS
-                                                     : -1);
-        if (n == 0 && !busy) {
-            warm_up(worker);
-            continue;
-        }
+        int n = poll(&watch, 1, busy ? 0 : -1);
         if (n < 0 && errno == EINTR)
             continue;
         bool alive = true;
@@ -264,10 +255,24 @@ static int serve(struct worker *worker)
     }
 }
 
+/* Whoever renders goes first. */
+static int fill_cache(const struct pen_renderer_config *config)
+{
+    setpriority(PRIO_PROCESS, 0, 19);
+    struct pen_renderer *renderer = pen_renderer_create(config, NULL);
+    if (!renderer)
+        return EXIT_REFUSED;
+    pen_renderer_warm_up(renderer, PEN_WARM_ALL);
+    bool lost = pen_renderer_is_lost(renderer);
+    pen_renderer_destroy(renderer);
+    return lost ? EXIT_LOST : 0;
+}
+
 int main(int argc, char **argv)
 {
     struct pen_renderer_config config = {0};
     static struct worker worker;
+    enum worker_warm_up what = WORKER_NO_WARM_UP;
     for (int i = 1; i + 1 < argc; i += 2) {
         unsigned long long value = strtoull(argv[i + 1], NULL, 10);
         if (!strcmp(argv[i], "--device"))
@@ -281,8 +286,10 @@ int main(int argc, char **argv)
         else if (!strcmp(argv[i], "--gpu-memory"))
             config.gpu_memory_bytes = value;
         else if (!strcmp(argv[i], "--warm-up"))
-            worker.warm_up = (enum worker_warm_up)value;
+            what = (enum worker_warm_up)value;
     }
+    if (what == WORKER_WARM_UP_FILL)
+        return fill_cache(&config);
     static struct channel_message hello;
     struct pen_error error = {0};
     uint64_t start = clock_now_ns();
@@ -301,7 +308,7 @@ int main(int argc, char **argv)
     hello.hello.create_ms = (float)clock_ms(clock_now_ns() - start);
     hello.hello.device = *pen_renderer_device(worker.renderer);
     send_or_exit(&hello);
-    if (worker.warm_up == WORKER_WARM_UP_FIRST)
+    if (what == WORKER_WARM_UP_USUAL)
         warm_up(&worker);
     int status = serve(&worker);
     worker_encoder_destroy(worker.encoder);

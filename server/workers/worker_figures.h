@@ -31,6 +31,7 @@ struct worker_pool_numbers {
     uint64_t gpu_bytes;
     struct pen_program_counts programs; /* of all workers, each since its start */
     double create_ms, warm_ms;          /* of the last worker that started */
+    double cache_ms;                    /* what filling the shader cache took; 0: not filled yet */
     double back_ms;                     /* from the death of a worker to its successor's hello */
     int pids[16];
     struct pen_error refused; /* the first worker found no device; it is not tried again */

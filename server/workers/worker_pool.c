@@ -25,16 +25,32 @@
 #define LEAST_PATIENCE_NS (10 * CLOCK_S)
 #define SILENCES 120
 #define START_PATIENCE_NS (120 * CLOCK_S)
+#define FILL_PATIENCE_NS (1800 * CLOCK_S)
 
 static bool is_stopping(const struct worker_pool *pool)
 {
     return __atomic_load_n(&pool->stopping, __ATOMIC_ACQUIRE);
 }
 
+static bool start(const struct slot *slot, struct process *process, enum worker_warm_up what,
+    const struct process_fd *fd, struct pen_error *error)
+{
+    const struct pen_renderer_config *renderer = &slot->pool->config.renderer;
+    char device[24], index[24], gpu[4], debug[4], memory[24], warm[4];
+    snprintf(device, sizeof device, "%u", renderer->device.choice);
+    snprintf(index, sizeof index, "%u", renderer->device.index + slot->index);
+    snprintf(gpu, sizeof gpu, "%d", renderer->device.require_gpu);
+    snprintf(debug, sizeof debug, "%d", renderer->device.debug);
+    snprintf(memory, sizeof memory, "%llu", (unsigned long long)renderer->gpu_memory_bytes);
+    snprintf(warm, sizeof warm, "%d", what);
+    char *arguments[] = {"penumbra-worker", "--device", device, "--device-index", index,
+        "--require-gpu", gpu, "--gl-debug", debug, "--gpu-memory", memory, "--warm-up", warm, NULL};
+    return process_start(process, slot->pool->config.worker_path, arguments, fd, fd != NULL, error);
+}
+
 static void spawn(struct slot *slot)
 {
     struct worker_pool *pool = slot->pool;
-    const struct pen_renderer_config *renderer = &pool->config.renderer;
     int pair[2];
     slot->spawned_ns = clock_now_ns();
     slot->said_hello = slot->hung = false;
@@ -46,21 +62,14 @@ static void spawn(struct slot *slot)
         slot->failures++;
         return;
     }
-    char device[24], index[24], gpu[4], debug[4], memory[24], warm[4];
-    snprintf(device, sizeof device, "%u", renderer->device.choice);
-    snprintf(index, sizeof index, "%u", renderer->device.index + slot->index);
-    snprintf(gpu, sizeof gpu, "%d", renderer->device.require_gpu);
-    snprintf(debug, sizeof debug, "%d", renderer->device.debug);
-    snprintf(memory, sizeof memory, "%llu", (unsigned long long)renderer->gpu_memory_bytes);
-    enum worker_warm_up warm_up = !pool->config.warm_up  ? WORKER_NO_WARM_UP
-                                  : slot->is_replacement ? WORKER_WARM_UP_IDLE
-                                                         : WORKER_WARM_UP_FIRST;
-    snprintf(warm, sizeof warm, "%d", warm_up);
-    char *arguments[] = {"penumbra-worker", "--device", device, "--device-index", index,
-        "--require-gpu", gpu, "--gl-debug", debug, "--gpu-memory", memory, "--warm-up", warm, NULL};
-    struct process_fd fd = {pair[1], CHANNEL_WORKER_FD};
+    /* One that replaces another has work waiting. */
+    pthread_mutex_lock(&pool->lock);
+    enum worker_warm_up what =
+        pool->numbers.warmed || !pool->config.warm_up ? WORKER_NO_WARM_UP : WORKER_WARM_UP_USUAL;
+    pthread_mutex_unlock(&pool->lock);
     struct pen_error error = {0};
-    if (process_start(&slot->process, pool->config.worker_path, arguments, &fd, 1, &error)) {
+    if (start(
+            slot, &slot->process, what, &(struct process_fd){pair[1], CHANNEL_WORKER_FD}, &error)) {
         slot->socket = pair[0];
     } else {
         log_event(LOG_ERROR, "worker %u could not be started: %s", slot->index, error.message);
@@ -68,6 +77,43 @@ static void spawn(struct slot *slot)
         close(pair[0]);
     }
     close(pair[1]);
+}
+
+/* Once a worker is ready, a process of its own compiles the rest into the driver's cache, so that no
+ * request waits for a compile that is not its own. Nothing depends on it. */
+static void look_after_cache(struct slot *slot)
+{
+    struct worker_pool *pool = slot->pool;
+    struct pen_error error = {0};
+    int status;
+    char text[64];
+    if (!pool->filler_ns) {
+        pthread_mutex_lock(&pool->lock);
+        bool now = pool->config.warm_up && pool->numbers.warmed;
+        pthread_mutex_unlock(&pool->lock);
+        if (!now)
+            return;
+        pool->filler_ns = clock_now_ns();
+        if (!start(slot, &pool->filler, WORKER_WARM_UP_FILL, NULL, &error))
+            log_event(LOG_ERROR, "the shader cache is not filled: %s", error.message);
+        return;
+    }
+    if (!pool->filler.pid)
+        return;
+    uint64_t took = clock_now_ns() - pool->filler_ns;
+    if (took > FILL_PATIENCE_NS)
+        process_signal(&pool->filler, SIGKILL);
+    if (!process_wait(&pool->filler, 0, &status))
+        return;
+    if (status) {
+        log_event(LOG_ERROR, "filling the shader cache %s after %.0f ms",
+            process_describe(status, text, sizeof text), clock_ms(took));
+        return;
+    }
+    pthread_mutex_lock(&pool->lock);
+    pool->numbers.cache_ms = clock_ms(took);
+    pthread_mutex_unlock(&pool->lock);
+    log_event(LOG_INFO, "the shader cache was filled in %.0f ms", clock_ms(took));
 }
 
 static void count(struct worker_pool *pool, uint32_t *number)
@@ -335,6 +381,8 @@ static void *run(void *argument)
         poll(watch, 3, wait_ms);
         if (watch[0].revents && read(slot->wake, &ignored, sizeof ignored) < 0 && errno != EAGAIN)
             abort();
+        if (slot->index == 0)
+            look_after_cache(slot);
         if (!alive)
             continue;
         if (is_hung(slot, clock_now_ns())) {
@@ -356,6 +404,10 @@ static void *run(void *argument)
             process_wait(&slot->process, -1, &status);
         }
         bury(slot);
+    }
+    if (slot->index == 0) {
+        process_signal(&pool->filler, SIGKILL);
+        process_wait(&pool->filler, -1, &(int){0});
     }
     return NULL;
 }

@@ -57,6 +57,9 @@ struct worker_pool {
     struct worker_pool_numbers numbers;
     bool stopping; /* atomic */
     struct slot slots[16];
+    /* Only the first slot's thread: */
+    struct process filler; /* of the driver's shader cache */
+    uint64_t filler_ns;    /* when it was started; 0: not yet */
 };
 
 struct flight *worker_slot_find(struct slot *slot, uint64_t job); /* NULL: it is not in flight */

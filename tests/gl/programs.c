@@ -1,5 +1,5 @@
 /* The programs that a renderer keeps: what makes a new one, what leaves, and that neither changes a
- * picture. Arguments: "taps", "bound" or "rows [METHOD]",
+ * picture. Arguments: "taps", "bound", "warm" or "rows [METHOD]",
  * a part of it. */
 #include "renderer/technique.h"
 #include "tests/gl/fixture.h"
@@ -190,6 +190,35 @@ static void check_rows(const char *only)
     pen_renderer_destroy(r);
 }
 
+/* After warming up nothing is left to compile for a usual picture of a scene that it did not draw. */
+static void check_warm(void)
+{
+    const struct pen_catalogue *catalogue = pen_renderer_catalogue();
+    struct pen_request request;
+    struct pen_result result;
+    uint8_t id[PEN_ID_BYTES];
+    for (int all = 0; all < 2; all++) {
+        struct pen_renderer *r = make(0);
+        pen_renderer_warm_up(r, all ? PEN_WARM_ALL : PEN_WARM_USUAL);
+        uint32_t before = pen_renderer_programs(r).compiled;
+        fixture_scene(r, PEN_GENERATED_DEMO, 0, 0, id);
+        pen_request_default(&request, catalogue);
+        for (uint32_t t = 0; t < (all ? catalogue->count : 1); t++) {
+            if (all)
+                rows_request(&request, id, catalogue->items[t]);
+            memcpy(request.scene, id, sizeof id);
+            request.width = 64, request.height = 48;
+            fixture_render(r, &request, &result);
+            if (result.programs.compiled != before)
+                fprintf(stderr, "%s compiles %u more\n", request.technique,
+                    result.programs.compiled - before);
+            CHECK(result.programs.compiled == before);
+            before = result.programs.compiled;
+        }
+        pen_renderer_destroy(r);
+    }
+}
+
 int main(int argc, char **argv)
 {
     struct pen_renderer *r = make(0);
@@ -200,6 +229,8 @@ int main(int argc, char **argv)
         check_taps();
     if (argc < 2 || !strcmp(argv[1], "bound"))
         check_bound();
+    if (argc < 2 || !strcmp(argv[1], "warm"))
+        check_warm();
     if (argc < 2 || !strcmp(argv[1], "rows"))
         check_rows(argc > 2 ? argv[2] : NULL);
     CHECK_DONE();

@@ -72,6 +72,7 @@ FLOORS = {
         ["frame"],
         ["lane"],
         ["renderer"],
+        ["warm_up"],
         ["registry"],
         ["catalogue"]],
 }

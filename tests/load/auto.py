@@ -101,6 +101,7 @@ def main():
     if options.scenes and not os.path.isdir(options.scenes):
         sys.exit(77)
     daemon = harness.Daemon("--warm-up=on")
+    harness.wait(lambda: daemon.metric("penumbra_shader_cache_fill_seconds") > 0, seconds=600)
     daemon.worker()
     options.folder = daemon.folder
     results = [check_scene(daemon, name, data, options) for name, data in scenes_of(options)]

@@ -253,8 +253,9 @@ static bool add_geometry(struct psc_builder *builder, const struct psc_mesh *mes
             p.bounds_min[k] = !i || x < p.bounds_min[k] ? x : p.bounds_min[k];
             p.bounds_max[k] = !i || x > p.bounds_max[k] ? x : p.bounds_max[k];
         }
-    p.flags =
-        psc_surface_flags((const float(*)[3])g.positions, g.vertex_count, g.indices, g.index_count);
+    p.flags = mesh->closed ? PSC_WATERTIGHT | PSC_OUTWARD
+                           : psc_surface_flags((const float(*)[3])g.positions, g.vertex_count,
+                                 g.indices, g.index_count);
 
     append_vertices(builder, &g);
     p.meshlet_count = append_meshlets(builder, &g, mesh, p.first_index);

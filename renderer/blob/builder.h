@@ -36,6 +36,7 @@ struct psc_mesh {
     uint32_t meshlet_count;
     const float (*points)[3]; /* what the mesh stands for, for the extent; NULL: its positions */
     uint32_t point_count;
+    bool closed; /* known to be of closed parts that face outwards; else that is found out */
 };
 
 /* Each returns the new item's number. Inputs are copied. */

@@ -158,6 +158,64 @@ static void take_attributes(struct solid *s, const struct imp_geometry *given)
         s->g.used[v] = given->used[s->from[v]];
 }
 
+/* Where a place lies on a curve that passes through all of the box, near places mostly one after the
+ * other (Morton 1966): ten bits of each coordinate in turns. */
+static uint32_t curve_place(const float p[3], const float low[3], float scale)
+{
+    uint32_t place = 0;
+    for (int k = 0; k < 3; k++) {
+        uint32_t at = (uint32_t)fminf(fmaxf((p[k] - low[k]) * scale, 0), 1023);
+        for (uint32_t bit = 0; bit < 10; bit++)
+            place |= (at >> bit & 1) << (3 * bit + (uint32_t)k);
+    }
+    return place;
+}
+
+static int compare_places(const void *a, const void *b)
+{
+    const uint64_t *p = a, *q = b;
+    return *p < *q ? -1 : *p > *q;
+}
+
+/* The numbers 0 .. count - 1 in an order in which neighbours are near; number i is at vertex at[i],
+ * or i. */
+static uint32_t *order_of_places(
+    const struct imp_geometry *g, const uint32_t *at, uint32_t step, uint32_t count)
+{
+    uint64_t *keys = pen_alloc_zero(count, sizeof *keys);
+    uint32_t *order = pen_alloc_zero(count, sizeof *order);
+    float low[3], size = 0;
+    for (int k = 0; k < 3; k++) {
+        float most = low[k] = g->positions[0][k];
+        for (uint32_t i = 1; i < g->vertex_count; i++) {
+            low[k] = fminf(low[k], g->positions[i][k]);
+            most = fmaxf(most, g->positions[i][k]);
+        }
+        size = fmaxf(size, most - low[k]);
+    }
+    float scale = size > 0 ? 1024 / size : 0;
+    for (uint32_t i = 0; i < count; i++) {
+        const float *p = g->positions[at ? at[(size_t)step * i] : i];
+        keys[i] = (uint64_t)curve_place(p, low, scale) << 32 | i;
+    }
+    qsort(keys, count, sizeof *keys, compare_places);
+    for (uint32_t i = 0; i < count; i++)
+        order[i] = (uint32_t)keys[i];
+    free(keys);
+    return order;
+}
+
+/* Whole solids of `each` triangles to a meshlet, after `first` triangles that have theirs. */
+static void add_meshlets(struct imp_geometry *g, uint32_t first, uint32_t each)
+{
+    uint32_t most = IMP_MESHLET_TRIANGLES / each * each;
+    for (uint32_t left = g->index_count / 3 - first; left;) {
+        uint32_t triangles = left < most ? left : most;
+        g->meshlet_triangles[g->meshlet_count++] = triangles;
+        left -= triangles;
+    }
+}
+
 #define BALL_VERTICES 6
 #define PLAIN_BALL_VERTICES 4
 #define BAR_VERTICES 8
@@ -221,16 +279,26 @@ bool imp_marks_thicken(
     imp_warn(context, "Points and lines are drawn as thin solids.");
     struct solid s = {.g = {.positions = pen_alloc_zero((size_t)vertices, sizeof *s.g.positions),
                           .normals = pen_alloc_zero((size_t)vertices, sizeof *s.g.normals),
-                          .indices = pen_alloc_zero((size_t)indices, sizeof *s.g.indices)},
+                          .indices = pen_alloc_zero((size_t)indices, sizeof *s.g.indices),
+                          .closed = !bars},
         .from = pen_alloc_zero((size_t)vertices, sizeof *s.from)};
+    uint64_t meshlets = indices / 3 / (IMP_MESHLET_TRIANGLES / 2) + 2;
+    s.g.meshlet_triangles = pen_alloc_zero((size_t)meshlets, sizeof *s.g.meshlet_triangles);
     float radius = radius_of(g, mode);
-    for (uint32_t v = 0; v < balls; v++)
-        (plain ? add_tetrahedron : add_octahedron)(&s, v, g->positions[v], radius);
+    uint32_t *order = order_of_places(g, NULL, 1, balls);
+    for (uint32_t i = 0; i < balls; i++)
+        (plain ? add_tetrahedron : add_octahedron)(&s, order[i], g->positions[order[i]], radius);
+    free(order);
+    add_meshlets(&s.g, 0, plain ? 4 : 8);
+    uint32_t ball_triangles = s.g.index_count / 3, step = mode == LINES ? 2 : 1;
+    order = order_of_places(g, g->indices, step, bars);
     for (uint32_t i = 0; i < bars; i++) {
-        uint32_t first = mode == LINES ? 2 * i : i;
+        uint32_t first = step * order[i];
         uint32_t a = g->indices[first], b = g->indices[(first + 1) % corners];
         add_bar(&s, a, b, g->positions[a], g->positions[b], radius);
     }
+    free(order);
+    add_meshlets(&s.g, ball_triangles, 8);
     take_attributes(&s, g);
     free(s.from);
     s.g.points = g->positions;

@@ -259,7 +259,8 @@ struct psc_mesh imp_geometry_mesh(
         .meshlet_triangles = g->meshlet_triangles,
         .meshlet_count = g->meshlet_count,
         .points = (const float(*)[3])g->points,
-        .point_count = g->point_count};
+        .point_count = g->point_count,
+        .closed = g->closed};
 }
 
 static bool add(struct imp_context *context, uint32_t number, struct imp_geometry *g, uint32_t *psc,

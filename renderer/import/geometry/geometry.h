@@ -1,5 +1,6 @@
 /* The triangles of one glTF primitive on their way into the blob. */
 #pragma once
+#include <stdbool.h>
 #include <stdint.h>
 
 struct imp_geometry {
@@ -12,10 +13,11 @@ struct imp_geometry {
     uint32_t used_of;   /* how many the file's primitive has */
     float (*points)[3]; /* that the positions are solids around; NULL: they are none */
     uint32_t point_count;
+    bool closed; /* of solids that face outwards, as is known */
     uint32_t vertex_count;
     uint32_t *indices;
     uint32_t index_count;
-    uint32_t *meshlet_triangles; /* NULL: none were built */
+    uint32_t *meshlet_triangles; /* NULL: none were built; else all is in a good order */
     uint32_t meshlet_count;
 };
 
@@ -24,6 +26,7 @@ void imp_geometry_finish(struct imp_geometry *geometry);
 /* optimise.c: welds equal vertices, orders triangles into meshlets of at most IMP_MESHLET_TRIANGLES
  * (compact ones with narrow normal cones, in an order kind to the vertex cache) and vertices by
  * first use. The set of triangles stays the same. Meshes that would cost more than is left of
- * *work, because very many triangles meet at one place, stay in their order. */
+ * *work, because very many triangles meet at one place, stay in their order, and so do those that
+ * have meshlets. */
 void imp_geometry_optimise(struct imp_geometry *geometry, uint64_t *work);
 #define IMP_MESHLET_TRIANGLES 124

@@ -108,6 +108,8 @@ static uint64_t crowding(const struct imp_geometry *g, unsigned *remap)
 
 void imp_geometry_optimise(struct imp_geometry *g, uint64_t *work)
 {
+    if (g->meshlet_triangles)
+        return;
     unsigned *remap = pen_alloc_zero(g->vertex_count, sizeof *remap);
     weld(g, remap);
     uint64_t crowd = crowding(g, remap);

@@ -57,9 +57,8 @@ static bool load_generated(
     struct pen_generated_options options = {.kind = kind, .triangles = TRIANGLES};
     void *data = NULL;
     size_t bytes = 0;
-    memset(id, 0, PEN_ID_BYTES);
-    memcpy(id, "warm", 4);
-    id[4] = (uint8_t)kind;
+    const uint8_t name[PEN_ID_BYTES] = {'w', 'a', 'r', 'm', (uint8_t)kind};
+    memcpy(id, name, PEN_ID_BYTES);
     if (!pen_generate_blob(&options, &data, &bytes, NULL))
         return false;
     if (glossy)

@@ -122,6 +122,7 @@ int main(void)
         }
         CHECK(next == picked.count);
         free(picked.indices);
+        free(picked.corners);
     }
     fprintf(stderr, "%u drawn, %u with a point that is wanted\n", kept, needed);
     CHECK(needed > 1000 && kept < 200 * TRIANGLES / 4);

@@ -1,7 +1,6 @@
 /* Pictures that have to end in the midst of a method that gives nothing before its end. */
 #include "tests/gl/fixture.h"
 #include "tests/unit/check.h"
-#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -18,16 +17,6 @@ static bool render(struct pen_renderer *r, const struct pen_request *request, do
         return true;
     fprintf(stderr, "%s: %s\n", request->technique, error.message);
     return false;
-}
-
-static double distance(const struct pen_frame *a, const struct pen_frame *b)
-{
-    size_t bytes = (size_t)4 * a->width * a->height;
-    const uint8_t *x = a->planes[0].data, *y = b->planes[0].data;
-    double sum = 0;
-    for (size_t i = 0; i < bytes; i++)
-        sum += (double)(x[i] - y[i]) * (x[i] - y[i]);
-    return sqrt(sum / (double)bytes);
 }
 
 static void make_request(struct pen_request *request, const uint8_t scene[PEN_ID_BYTES],
@@ -59,7 +48,7 @@ static void check_method(
         return;
     }
     CHECK(render(r, &request, 3.6e6, &ample, &result));
-    CHECK(distance(&full, &ample) == 0 && result.progress.done == 1);
+    CHECK(fixture_distance(&full, &ample) == 0 && result.progress.done == 1);
     CHECK(result.warning_count == 0);
     double whole_ms = (double)result.progress.elapsed_ms;
     pen_renderer_drop_shadows(r);
@@ -68,14 +57,14 @@ static void check_method(
     CHECK(result.warning_count == 1 && strstr(result.warnings[0], "sketch"));
     CHECK(!memcmp(
         result.completed.technique_params, request.technique_params, sizeof bare.technique_params));
-    double off = distance(&early, &full), empty = distance(&none, &full);
+    double off = fixture_distance(&early, &full), empty = fixture_distance(&none, &full);
     printf("%s, %u lights: off %.2f, without shadows %.2f\n", name, lights, off, empty);
     CHECK(empty > 4 && off < 0.5 * empty);
     for (int i = 1; i < 4; i++) { /* wherever that is */
         pen_frame_finish(&early);
         pen_renderer_drop_shadows(r);
         CHECK(render(r, &request, whole_ms * i / 4, &early, &result));
-        off = distance(&early, &full);
+        off = fixture_distance(&early, &full);
         CHECK(result.progress.done ? off == 0 : off < 0.5 * empty);
     }
     pen_frame_finish(&full), pen_frame_finish(&ample);

@@ -1,6 +1,7 @@
 #include "tests/gl/fixture.h"
 #include "protocol/fnv.h"
 #include <stdio.h>
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
@@ -72,4 +73,14 @@ uint64_t fixture_render(
         pen_fnv(PEN_FNV_START, frame.planes[0].data, (size_t)frame.width * frame.height * 4);
     pen_frame_finish(&frame);
     return hash;
+}
+
+double fixture_distance(const struct pen_frame *a, const struct pen_frame *b)
+{
+    size_t bytes = (size_t)4 * a->width * a->height;
+    const uint8_t *x = a->planes[0].data, *y = b->planes[0].data;
+    double sum = 0;
+    for (size_t i = 0; i < bytes; i++)
+        sum += (double)(x[i] - y[i]) * (x[i] - y[i]);
+    return sqrt(sum / (double)bytes);
 }

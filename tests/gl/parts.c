@@ -52,16 +52,6 @@ static bool render(struct pen_renderer *r, const struct pen_request *request, do
     return false;
 }
 
-static double distance(const struct pen_frame *a, const struct pen_frame *b)
-{
-    size_t bytes = (size_t)4 * a->width * a->height;
-    const uint8_t *x = a->planes[0].data, *y = b->planes[0].data;
-    double sum = 0;
-    for (size_t i = 0; i < bytes; i++)
-        sum += (double)(x[i] - y[i]) * (x[i] - y[i]);
-    return sqrt(sum / (double)bytes);
-}
-
 static void set_number(struct pen_request *request, const char *name, double value)
 {
     const struct pen_technique_info *info =
@@ -83,13 +73,13 @@ static void check_watching(struct pen_renderer *r, const struct pen_request *req
     for (int turns = 0; turns < 2; turns++) {
         pen_renderer_drop_shadows(r);
         CHECK(render(r, request, turns ? 0 : INFINITY, &parts, &watched, &result));
-        CHECK(distance(&plain, &watched) == 0);
+        CHECK(fixture_distance(&plain, &watched) == 0);
         CHECK(result.progress.number == parts.count);
         uint32_t done = 0;
         for (uint32_t i = 0; i < parts.count; i++) {
             const struct pen_progress *progress = &parts.results[i].progress;
             printf("%s: %u of %u, off %.3f, estimate %.4f, %.0f ms\n", request->technique,
-                progress->done, progress->total, distance(&parts.frames[i], &plain),
+                progress->done, progress->total, fixture_distance(&parts.frames[i], &plain),
                 (double)progress->standard_error, (double)progress->elapsed_ms);
             CHECK(progress->number == i && progress->done > done);
             CHECK(progress->done < progress->total && progress->total == result.progress.total);
@@ -122,7 +112,7 @@ static void check_falling(struct pen_renderer *r, const struct pen_request *requ
     CHECK(parts.count >= 3);
     for (uint32_t i = 0; i < parts.count; i++) {
         const struct pen_progress *progress = &parts.results[i].progress;
-        double off = distance(&parts.frames[i], &last) / 255;
+        double off = fixture_distance(&parts.frames[i], &last) / 255;
         printf("%s: %u of %u, off %.4f, estimate %.4f\n", request->technique, progress->done,
             progress->total, off, (double)progress->standard_error);
         /* A face of a light may show little of the picture: within noise. */

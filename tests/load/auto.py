@@ -1,11 +1,13 @@
 """What "auto" promises: max_rmse holds at the size that was asked for, checked against raytraced, and
-budget_ms holds for 95 of 100 requests on a machine that does nothing else.
+budget_ms holds for 95 of 100 requests on a machine that does nothing else. Of few requests a few more
+may miss it, as many as chance alone gives once in a hundred times.
 
 usage: auto.py [--scenes FOLDER | --generated NAME,...] [--size W,H] [--requests N] [--orbit N]
 Exits 77 (skipped) when FOLDER is not there.
 """
 import argparse
 import json
+import math
 import os
 import subprocess
 import sys
@@ -15,7 +17,14 @@ sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "../
 import harness  # noqa: E402
 
 MAX_RMSE = 0.02
-SHARE = 0.95  # of the requests that must stay within the budget
+SHARE = 0.95  # of the requests that stay within the budget, as promised
+DOUBT = 0.01  # how improbable what is seen may be if that is so
+
+
+def is_plausible(kept, count):
+    """Whether so few of `count` are to be expected when each keeps to it with probability SHARE."""
+    return DOUBT <= sum(math.comb(count, k) * SHARE**k * (1 - SHARE)**(count - k)
+                        for k in range(kept + 1))
 
 
 def render(daemon, scene, body):
@@ -56,7 +65,7 @@ def check_budget(daemon, scene, body, requests, name, view):
     print("  budget_ms %g, %s: %d of %d within (%d with a warning), median %.1f, worst %.1f; %s" % (
         budget, name, kept, requests, warned, times[len(times) // 2], times[-1],
         ", ".join("%s (%d)" % c for c in choice.items())), flush=True)
-    return kept >= SHARE * requests
+    return is_plausible(kept, requests)
 
 
 def check_scene(daemon, name, data, options):

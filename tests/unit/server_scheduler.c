@@ -1,5 +1,6 @@
 /* Order, limits, sharing, deadlines and retries of the queue; then all of it from many threads. */
 #include "server/base/clock.h"
+#include "server/queue/compare.h"
 #include "server/queue/scheduler.h"
 #include "tests/unit/check.h"
 #include <pthread.h>
@@ -372,8 +373,40 @@ static void test_parts(void)
     scheduler_destroy(s);
 }
 
+static void measured(void *owner, struct compare *compare, const struct pen_error *error)
+{
+    CHECK(error->code == PEN_OK);
+    *(uint32_t *)owner = compare_done_count(compare);
+    compare_destroy(compare);
+}
+
+/* What is timed starts from nothing: a render that goes on from kept sums costs next to nothing. */
+static void test_measured_is_fresh(void)
+{
+    struct scheduler *s = make(4, 0);
+    struct pen_request requests[3] = {{.width = 1}, {.width = 2}, {.width = 2}};
+    const uint32_t measures[3] = {MEASURE_REFERENCE, MEASURE_PICTURE, MEASURE_PICTURE};
+    uint32_t done = 0;
+    struct compare_plan plan = {.requests = requests,
+        .count = 3,
+        .measures = measures,
+        .patience_ms = 60000,
+        .done = measured,
+        .owner = &done};
+    CHECK(compare_start(s, &plan, NULL));
+    for (int i = 0; i < 3; i++) {
+        struct render *render = scheduler_take(s, &any);
+        CHECK(render && render->fresh);
+        if (render)
+            scheduler_finish(s, render, &(struct outcome){0});
+    }
+    CHECK(done == 3);
+    scheduler_destroy(s);
+}
+
 int main(void)
 {
+    test_measured_is_fresh();
     test_parts();
     test_order();
     test_limits();

@@ -28,7 +28,6 @@ bool trace_points_make(
     uint32_t *xs = malloc(2 * (size_t)total * sizeof *xs), *ys = xs ? xs + total : NULL;
     uint32_t block = samples > TRACE_FIRST_BLOCK ? TRACE_FIRST_BLOCK : samples;
     uint32_t early = TRACE_PRETEST_FIRST, late = TRACE_PRETEST_NET - early;
-    uint32_t salt = trace_hash(seed + 1);
     if (!xs)
         return pen_fail(error, PEN_INTERNAL, "", "Out of memory.");
     *p = (struct trace_points){.u = (int32_t *)xs,
@@ -36,8 +35,7 @@ bool trace_points_make(
         .samples = samples,
         .total = total,
         .low_bits = 0xffffffffu >> (log2_floor(block) / 2),
-        .pretest_low_bits = 0xffffffffu >> (log2_floor(TRACE_PRETEST_FIRST) / 2),
-        .salt = salt};
+        .pretest_low_bits = 0xffffffffu >> (log2_floor(TRACE_PRETEST_FIRST) / 2)};
     bool ok = trace_samples_net(0, early, ~seed, xs + net, ys + net);
     for (uint32_t first = early; first < TRACE_PRETEST_NET && ok; first *= 2)
         ok = trace_samples_net(first, first, ~seed, xs + net + first, ys + net + first);
@@ -45,8 +43,7 @@ bool trace_points_make(
         if (first > block) /* the second is as long as the first, each then as all before it */
             block = first;
         ok = trace_samples_net(first, block, seed, xs + first, ys + first);
-        p->blocks[p->block_count++] =
-            (struct trace_block){p->u + first, p->v + first, block, salt + first};
+        p->blocks[p->block_count++] = (struct trace_block){p->u + first, p->v + first, block};
     }
     if (!ok) {
         trace_points_finish(p);
@@ -57,12 +54,9 @@ bool trace_points_make(
         ys[i] ^= 0x80000000u;
     }
     make_rim(p, rim, round);
-    uint32_t apart = salt + TRACE_MAX_SAMPLES;
-    p->pretest[0] = (struct trace_block){p->u + net, p->v + net, early, apart};
-    p->pretest[1] =
-        (struct trace_block){p->u + net + early, p->v + net + early, late, apart + early};
-    p->rim = (struct trace_block){
-        p->u + rim, p->v + rim, TRACE_PRETEST_RIM, salt + TRACE_MAX_SAMPLES + TRACE_PRETEST_NET};
+    p->pretest[0] = (struct trace_block){p->u + net, p->v + net, early};
+    p->pretest[1] = (struct trace_block){p->u + net + early, p->v + net + early, late};
+    p->rim = (struct trace_block){p->u + rim, p->v + rim, TRACE_PRETEST_RIM};
     return true;
 }
 

@@ -12,13 +12,13 @@
 #define TRACE_PRETEST_NET 16u
 #define TRACE_PRETEST_FIRST 4u /* of them a net, too, and the first */
 #define TRACE_PRETEST_RIM 4u
-#define TRACE_DILATION 4u /* of what the pre-test finds mixed, receivers */
+#define TRACE_DILATION 4u          /* of what the pre-test finds mixed, receivers */
+#define TRACE_LEAST_SHARE 0x1p-12f /* of its light that a ray may bring: with less it is stopped */
 
 /* Sample points as signed 32-bit fractions of [-1,1]. Points 2k and 2k + 1 share a stratum. */
 struct trace_block {
     const int32_t *u, *v;
     uint32_t count;
-    uint32_t salt; /* of the stochastic alpha: point i takes trace_hash(salt + i) */
 };
 
 /* All points of a job. Low bits: which bits of a point a receiver may shift by a digital XOR of its
@@ -28,7 +28,7 @@ struct trace_points {
     uint32_t samples, total;                     /* total: with those of the pre-test */
     struct trace_block blocks[TRACE_MAX_BLOCKS]; /* one after the other from point 0 */
     struct trace_block pretest[2], rim; /* a net, its beginning first; the light's corners */
-    uint32_t block_count, low_bits, pretest_low_bits, salt; /* salt: of point 0 */
+    uint32_t block_count, low_bits, pretest_low_bits;
 };
 
 /* `samples` a power of two up to TRACE_MAX_SAMPLES, in blocks of 64, 64, 128, 256, ...: each a net,

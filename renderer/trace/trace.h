@@ -3,8 +3,8 @@
  *
  * Who casts: every triangle of the scene, under the rules of the shadow maps. A triangle of a
  * single-sided material casts with both sides or, front_only, only when its front faces the light; a
- * MASK texel below the cutoff casts nothing; a BLEND surface stops a share alpha of the rays (a stochastic threshold whose mean
- * is exact). Textures are read at their finest level. */
+ * MASK texel below the cutoff casts nothing; a BLEND surface stops a share alpha of each ray's light,
+ * and so do those behind it of what is left. Textures are read at their finest level. */
 #pragma once
 #include "renderer/blob/pscene.h"
 

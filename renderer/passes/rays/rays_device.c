@@ -46,11 +46,11 @@ static void make_defines(struct work *w)
     bool weights = w->job->weighting == PEN_TRACE_G && !point;
     snprintf(w->defines, sizeof w->defines,
         "#define LIGHT_TYPE %u\n#define PRETEST_NET %uu\n#define PRETEST_RIM %uu\n"
-        "#define DILATION %u\n%s%s%s%s%s%s",
+        "#define DILATION %u\n#define LEAST_SHARE %.9g\n%s%s%s%s%s%s",
         w->light.type, TRACE_PRETEST_NET, TRACE_PRETEST_RIM, TRACE_DILATION,
-        w->scene->alpha_triangles ? "#define ALPHA\n" : "", textured ? "#define COLOUR\n" : "",
-        weights ? "#define WEIGHTS\n" : "", w->pretest ? "" : "#define EVERY\n",
-        weights && textured ? "#define LIT_NEEDS_SUM\n" : "",
+        (double)TRACE_LEAST_SHARE, w->scene->alpha_triangles ? "#define ALPHA\n" : "",
+        textured ? "#define COLOUR\n" : "", weights ? "#define WEIGHTS\n" : "",
+        w->pretest ? "" : "#define EVERY\n", weights && textured ? "#define LIT_NEEDS_SUM\n" : "",
         w->run->request->casters == PEN_CASTERS_FRONT ? "#define FRONT_ONLY\n" : "");
 }
 
@@ -97,8 +97,8 @@ static void fill_block(const struct work *w, struct ray_block *b)
     bool point = l->type == PEN_TRACE_POINT;
     float half[2] = {l->half[0], l->half[l->type == PEN_TRACE_RECT]};
     uint32_t seed = w->job->seed;
-    *b = (struct ray_block){.net = {trace_hash(seed), p->low_bits, p->salt, p->samples},
-        .pretest = {trace_hash(~seed), p->pretest_low_bits, p->pretest[0].salt},
+    *b = (struct ray_block){.net = {trace_hash(seed), p->low_bits, p->samples},
+        .pretest = {trace_hash(~seed), p->pretest_low_bits},
         .size = {w->run->width, w->run->height, w->scene->node_count}};
     for (int c = 0; c < 3; c++) {
         b->origin[c] = l->origin[c];

@@ -3,7 +3,7 @@
 
 const uint NO_TEXELS = 0xffffffffu;
 
-uint ray_salt; // hash of the ray; set before it is traced
+float ray_share; // of the ray's light that blended surfaces let through; 1 before it is traced
 
 int alpha_wrap(int i, int size, uint mode)
 {
@@ -58,8 +58,9 @@ bool ray_alpha_hit(uint record, vec2 uv)
         ivec2 size = ivec2(alpha_words[m + WORD_WIDTH], alpha_words[m + WORD_HEIGHT]);
         alpha *= alpha_sample(first, size, flags, s);
     }
-    // The same answer however often a ray meets the triangle; its mean is a share alpha.
-    if ((flags & FLAG_BLEND) != 0u)
-        threshold = (float(trace_hash(ray_salt + record * 0x9e3779b9u) >> 8u) + 0.5) / 16777216.0;
+    if ((flags & FLAG_BLEND) != 0u) {
+        ray_share *= 1.0 - clamp(alpha, 0.0, 1.0);
+        return ray_share < LEAST_SHARE;
+    }
     return alpha >= threshold;
 }

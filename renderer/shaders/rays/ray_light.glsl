@@ -7,7 +7,6 @@ struct RayReceiver {
     vec3 origin;     // lifted
     vec3 base, a, b; // from there to the light's centre, and its half axes
     float cos_base, cos_a, cos_b, front;
-    uint id;
     ivec2 shift;
     bool reachable; // some light point is in front
 };
@@ -46,8 +45,8 @@ bool load_receiver(ivec2 pixel, uvec4 net, out RayReceiver r)
     float cosine = max(abs(dot(n, to)) / max(length(to), 1e-30), 0.1);
     vec3 lift = receiver_lift(p) * n;
     p += min(max(ray.eye.w, ray.bias.z / cosine), 0.5) * to; // see pen_trace_job
-    r.id = trace_hash(uint(pixel.y) * ray.size.x + uint(pixel.x) ^ net.x);
-    r.shift = ivec2(r.id & net.y, trace_hash(r.id ^ 0x68bc21ebu) & net.y);
+    uint hash = trace_hash(uint(pixel.y) * ray.size.x + uint(pixel.x) ^ net.x);
+    r.shift = ivec2(hash & net.y, trace_hash(hash ^ 0x68bc21ebu) & net.y);
     r.a = ray.a.xyz;
     r.b = ray.b.xyz;
     r.base = LIGHT_TYPE == PEN_TRACE_SUN ? -ray.z.xyz : ray.origin.xyz - p;
@@ -98,11 +97,14 @@ vec3 direction_to(RayReceiver r, vec2 s)
     return r.base + s.x * r.a + s.y * r.b;
 }
 
-bool is_visible(RayReceiver r, vec3 direction, uint salt)
+// V of one sample: 0 or 1, or what blended surfaces let through.
+float share_seen(RayReceiver r, vec3 direction)
 {
-#ifdef ALPHA
-    ray_salt = trace_hash(r.id ^ trace_hash(salt));
-#endif
     float limit = LIGHT_TYPE == PEN_TRACE_SUN ? 1e30 : RAY_END;
-    return !bvh_occluded(r.origin, direction, limit, ray.size.z);
+#ifdef ALPHA
+    ray_share = 1.0;
+    return bvh_occluded(r.origin, direction, limit, ray.size.z) ? 0.0 : ray_share;
+#else
+    return bvh_occluded(r.origin, direction, limit, ray.size.z) ? 0.0 : 1.0;
+#endif
 }

@@ -11,19 +11,22 @@ void main()
     if (any(greaterThanEqual(pixel, ivec2(ray.size.xy))))
         return;
     RayReceiver r;
-    uint verdict = NO_RECEIVER, seen = 0u, rays = 0u, taken = 0u;
+    uint verdict = NO_RECEIVER, rays = 0u, taken = 0u;
+    float seen = 0.0, all = 0.0;
     if (load_receiver(pixel, ray.pretest, r)) {
         for (; r.reachable && taken < PRETEST_NET + PRETEST_RIM; taken++) {
             ivec2 shift = taken < PRETEST_NET ? r.shift : ivec2(0);
-            vec2 s = light_point(points[ray.net.w + taken] ^ shift);
+            vec2 s = light_point(points[ray.net.z + taken] ^ shift);
             if (cosine_to(r, s) > 0.0) {
                 rays++;
-                seen += is_visible(r, direction_to(r, s), ray.pretest.z + taken) ? 1u : 0u;
+                float share = share_seen(r, direction_to(r, s));
+                seen += share;
+                all += share == 1.0 ? 1.0 : 0.0;
             }
         }
         bool cut = bvh_cut || (r.reachable && taken < PRETEST_NET + PRETEST_RIM);
-        bool all_seen = seen == PRETEST_NET + PRETEST_RIM;
-        verdict = cut || (seen > 0u && !all_seen) ? MIXED : all_seen ? LIT : UMBRA;
+        bool all_seen = all == float(PRETEST_NET + PRETEST_RIM);
+        verdict = cut || (seen > 0.0 && !all_seen) ? MIXED : all_seen ? LIT : UMBRA;
         count_rays(rays);
     }
     imageStore(verdicts, pixel, uvec4(verdict));

@@ -17,9 +17,9 @@ void finish(ivec2 pixel, inout RaySums sums)
     uint samples = range.z + range.w;
     bool all_seen = sums.count == samples;
 #ifdef WEIGHTS
-    float weight = sums.weight, visible = sums.visible;
+    float weight = sums.weight;
 #else
-    float weight = float(samples), visible = float(sums.count);
+    float weight = float(samples);
 #endif
     float error = samples > 1u && weight > 0.0 ? sqrt(sums.pairs) / weight : 0.0;
     if (ends == RAY_MAY_END && !(error < ray.bias.y))
@@ -28,7 +28,7 @@ void finish(ivec2 pixel, inout RaySums sums)
         sums.pairs = -1.0;
     vec4 v = vec4(0.0);
     if (weight > 0.0) {
-        v.a = all_seen ? 1.0 : visible / weight;
+        v.a = all_seen ? 1.0 : sums.visible / weight;
 #ifdef COLOUR
         v.rgb = sums.rgb.rgb / weight;
 #else
@@ -44,36 +44,34 @@ void finish(ivec2 pixel, inout RaySums sums)
 
 void take_samples(RayReceiver r, bool traced, inout RaySums sums)
 {
-    float last_weight = 0.0;
-    bool last_seen = false;
+    float last_weight = 0.0, last_share = 0.0;
     uint rays = 0u, taken = 0u;
     for (uint i = range.z; i < range.z + range.w; i++) {
         vec2 s = light_point(points[i] ^ r.shift);
         vec3 direction = direction_to(r, s);
         float cosine = cosine_to(r, s), weight = 1.0;
-        bool seen = r.reachable && cosine > 0.0;
+        bool faced = r.reachable && cosine > 0.0;
+        float share = faced ? 1.0 : 0.0;
 #ifdef WEIGHTS
         float d2 = dot(direction, direction);
-        weight = seen ? cosine * r.front / (d2 * d2) : 0.0;
-#endif
-        if (seen && traced) {
-            rays++;
-            seen = is_visible(r, direction, ray.net.z + i);
-        }
-        sums.count += seen ? 1u : 0u;
-#ifdef WEIGHTS
+        weight = faced ? cosine * r.front / (d2 * d2) : 0.0;
         sums.weight += weight;
-        sums.visible += seen ? weight : 0.0;
 #endif
+        if (faced && traced) {
+            rays++;
+            share = share_seen(r, direction);
+        }
+        sums.count += share == 1.0 ? 1u : 0u;
+        sums.visible += share * weight;
 #ifdef COLOUR
-        if (seen)
-            sums.rgb.rgb += weight * textureLod(emission_texture, 0.5 * s + 0.5, 0.0).rgb;
+        if (share > 0.0)
+            sums.rgb.rgb += share * weight * textureLod(emission_texture, 0.5 * s + 0.5, 0.0).rgb;
 #endif
         if ((i & 1u) == 0u) {
-            last_seen = seen;
+            last_share = share;
             last_weight = weight;
-        } else if (seen != last_seen) {
-            float mean = 0.5 * (weight + last_weight);
+        } else {
+            float mean = 0.5 * (weight + last_weight) * (share - last_share);
             sums.pairs += mean * mean;
         }
         taken++;

@@ -92,11 +92,21 @@ static inline void filter_facing(const struct RTCFilterFunctionNArguments *args,
             args->valid[i] = 0;
 }
 
+/* What is left of the light of the shadow ray that is called `id`, behind a surface. Embree asks
+ * once about a ray and a triangle, since its hierarchies of medium quality refer to each once. */
+static bool dims_to_nothing(struct trace_context *context, uint32_t id, float alpha)
+{
+    context->share[id] *= 1 - fminf(fmaxf(alpha, 0), 1);
+    if (context->share[id] >= TRACE_LEAST_SHARE)
+        return false;
+    context->share[id] = 0;
+    return true;
+}
+
 static inline void filter_alpha(const struct RTCFilterFunctionNArguments *args, bool end)
 {
     const struct trace_filter *filter = args->geometryUserPtr;
     const struct trace_alpha *alpha = filter->alpha;
-    const struct trace_context *context = (const struct trace_context *)args->context;
     uint32_t n = args->N;
     for (uint32_t i = 0; i < n; i++) {
         if (args->valid[i] != -1)
@@ -105,15 +115,20 @@ static inline void filter_alpha(const struct RTCFilterFunctionNArguments *args, 
         if (filter->triangles)
             primitive = filter->triangles[primitive];
         const struct trace_alpha_material *m = &alpha->table[alpha->materials[primitive]];
-        float threshold = m->cutoff;
-        if (m->blend) { /* the same answer however often Embree asks about this ray and triangle */
-            uint32_t h = trace_hash(uint_at(args->ray, RAY_ID, n, i) ^ context->salt);
-            h = trace_hash(h + primitive * 0x9e3779b9u);
-            threshold = ((float)(h >> 8) + 0.5f) * 0x1p-24f;
+        bool counts = m->two_sided || filter->both_sides || faces_end(args, i) == end;
+        if (counts) {
+            uint32_t id = uint_at(args->ray, RAY_ID, n, i);
+            float a = trace_alpha_at(alpha, primitive, float_at(args->hit, HIT_U, n, i),
+                float_at(args->hit, HIT_V, n, i));
+            if (m->blend && end)
+                counts = dims_to_nothing((struct trace_context *)args->context, id, a);
+            else if (m->blend) /* a share alpha of the eye's rays see it */
+                counts =
+                    a >= ((float)(trace_hash(id + primitive * 0x9e3779b9u) >> 8) + 0.5f) * 0x1p-24f;
+            else
+                counts = a >= m->cutoff;
         }
-        if ((!m->two_sided && !filter->both_sides && faces_end(args, i) != end) ||
-            trace_alpha_at(alpha, primitive, float_at(args->hit, HIT_U, n, i),
-                float_at(args->hit, HIT_V, n, i)) < threshold)
+        if (!counts)
             args->valid[i] = 0;
     }
 }

@@ -42,6 +42,7 @@ struct trace_alpha {
     struct trace_alpha_material *table; /* one per blob material; unused ones are zero */
     uint8_t **images;                   /* one per blob image; NULL where unused */
     uint32_t image_count;
+    bool blends; /* of some a share alpha casts */
 };
 
 /* What decides on which side of a triangle's plane a light lies: its centre (sun: the direction to
@@ -106,7 +107,7 @@ struct pen_trace_scene {
 /* The context of a query: Embree's own first, so that filters can cast back. */
 struct trace_context {
     embree_context embree;
-    uint32_t salt; /* makes stochastic alpha of one sample differ from that of the next */
+    float share[16]; /* of a shadow ray's light that blended surfaces let through, by its id */
 };
 
 /* Filters: shadow rays run from the receiver to the light, primary rays from the eye. */

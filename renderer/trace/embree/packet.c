@@ -121,7 +121,7 @@ void trace_packet_load(struct trace_packet *p, const struct trace_emitter *e,
         uint32_t h = trace_hash(receivers[lane].pixel ^ trace_hash(seed));
         p->shift_u[lane] = (int32_t)(h & low_bits);
         p->shift_v[lane] = (int32_t)(trace_hash(h ^ 0x68bc21ebu) & low_bits);
-        p->ray.id[lane] = h;
+        p->ray.id[lane] = lane;
         p->ray.mask[lane] = ~0u;
         p->active[lane] = load_lane(p, e, &receivers[lane], lane) ? -1 : 0;
         p->any_active |= p->active[lane] != 0;
@@ -160,7 +160,7 @@ static inline __attribute__((always_inline)) int aim(struct trace_packet *p,
 
 /* The sums that need the sample's weight or colour. */
 static void add_weighted(struct trace_packet *p, const struct trace_emitter *e, uint32_t mode,
-    const float u[LANES], const float v[LANES], const int32_t seen[LANES], float weight[LANES],
+    const float u[LANES], const float v[LANES], const float share[LANES], float weight[LANES],
     struct trace_sums *sums)
 {
     for (int l = 0; l < LANES; l++) {
@@ -173,16 +173,16 @@ static void add_weighted(struct trace_packet *p, const struct trace_emitter *e, 
         }
         weight[l] = w;
         sums->weight[l] += w;
-        sums->visible[l] += seen[l] ? w : 0;
+        sums->visible[l] += share[l] * w;
     }
     if (mode & TRACE_COLOUR)
         for (int l = 0; l < LANES; l++) {
             float rgb[3];
-            if (!seen[l])
+            if (share[l] == 0)
                 continue;
             trace_emission_at(e, u[l], v[l], rgb);
             for (int c = 0; c < 3; c++)
-                sums->rgb[c][l] += weight[l] * rgb[c];
+                sums->rgb[c][l] += share[l] * weight[l] * rgb[c];
         }
 }
 
@@ -193,29 +193,40 @@ static inline __attribute__((always_inline)) void run(const struct trace_emitter
     struct trace_context query;
     embree_context_init(&query.embree);
     float u[LANES], v[LANES], weight[LANES] = {0}, last_weight[LANES] = {0};
+    float share[LANES] = {0}, last_share[LANES] = {0};
     int32_t valid[LANES] __attribute__((aligned(64)));
     int32_t seen[LANES], last[LANES] = {0}, count[LANES] = {0}, pairs[LANES] = {0};
     for (uint32_t i = 0; i < block->count; i++) {
         int in_front = aim(p, e, block->u[i], block->v[i], !(mode & TRACE_UNSHIFTED), disk,
             own_frame, sun, u, v, valid);
         if (in_front && !(mode & TRACE_ASSUME_VISIBLE)) {
-            query.salt = trace_hash(block->salt + i);
+            if (mode & TRACE_SHARES)
+                for (int l = 0; l < LANES; l++)
+                    query.share[l] = 1;
             embree_occluded16(valid, e->scene, &query.embree, &p->ray);
             sums->rays += (uint32_t)in_front;
         }
         for (int l = 0; l < LANES; l++) {
             seen[l] = p->ray.tfar[l] > 0 ? valid[l] : 0;
-            count[l] -= seen[l];
+            share[l] = (float)-seen[l];
         }
-        if (mode & (TRACE_COLOUR | TRACE_WEIGHTS))
-            add_weighted(p, e, mode, u, v, seen, weight, sums);
+        if ((mode & TRACE_SHARES) && in_front && !(mode & TRACE_ASSUME_VISIBLE))
+            for (int l = 0; l < LANES; l++) {
+                share[l] *= query.share[l];
+                seen[l] = share[l] == 1 ? -1 : 0;
+            }
+        for (int l = 0; l < LANES; l++)
+            count[l] -= seen[l];
+        if (mode & (TRACE_COLOUR | TRACE_WEIGHTS | TRACE_SHARES))
+            add_weighted(p, e, mode, u, v, share, weight, sums);
         if (!(i & 1)) {
             memcpy(last, seen, sizeof last);
+            memcpy(last_share, share, sizeof share);
             memcpy(last_weight, weight, sizeof weight);
-        } else if (mode & TRACE_WEIGHTS) {
+        } else if (mode & (TRACE_WEIGHTS | TRACE_SHARES)) {
             for (int l = 0; l < LANES; l++) {
-                float mean = 0.5f * (weight[l] + last_weight[l]);
-                sums->pairs[l] += seen[l] != last[l] ? mean * mean : 0;
+                float mean = 0.5f * (weight[l] + last_weight[l]) * (share[l] - last_share[l]);
+                sums->pairs[l] += mean * mean;
             }
         } else {
             for (int l = 0; l < LANES; l++)

@@ -34,9 +34,10 @@ struct trace_packet {
     bool any_active;
 };
 
-/* Sums over samples; without emission and G only `count`, `pairs` and `rays` are kept. */
+/* Sums over samples; in TRACE_COUNT_ONLY only `count`, `pairs` and `rays` are kept. V of a sample is 0
+ * or 1, or with TRACE_SHARES the share of its light that blended surfaces let through. */
 struct trace_sums {
-    uint32_t count[TRACE_LANES]; /* visible samples */
+    uint32_t count[TRACE_LANES]; /* wholly visible samples */
     float pairs[TRACE_LANES];    /* over pairs: (difference of V, times the pair's mean weight)^2 */
     float weight[TRACE_LANES], visible[TRACE_LANES]; /* sum w, sum w V */
     float rgb[3][TRACE_LANES];                       /* sum w e V */
@@ -60,6 +61,7 @@ enum trace_mode {
     TRACE_WEIGHTS = 2,        /* weight by G */
     TRACE_ASSUME_VISIBLE = 4, /* shoot no rays */
     TRACE_UNSHIFTED = 8,      /* take the points as they are */
+    TRACE_SHARES = 16,        /* there are blended surfaces */
 };
 
 /* Adds the block's samples to *sums. */

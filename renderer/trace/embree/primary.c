@@ -117,7 +117,7 @@ static void trace_block(void *context, uint32_t item)
         ray.hit.geomID[lane] = ray.hit.instID[0][lane] = RTC_INVALID_GEOMETRY_ID;
         valid[lane] = x < camera->width && y < camera->height ? -1 : 0;
     }
-    struct trace_context query = {.salt = 0};
+    struct trace_context query = {0};
     embree_context_init(&query.embree);
     embree_intersect16(valid, p->rtc, &query.embree, &ray);
     for (uint32_t lane = 0; lane < LANES; lane++)

@@ -58,6 +58,7 @@ static bool prepare_alpha_material(struct build *b, uint32_t index)
         .blend = m->alpha_mode == PSC_BLEND,
         .two_sided = (m->flags & PSC_DOUBLE_SIDED) != 0,
         .prepared = true};
+    b->out->alpha.blends |= out->blend;
     if (m->base.texture < 0)
         return true;
     const struct psc_texture *texture = &b->blob->textures[m->base.texture];

@@ -105,15 +105,15 @@ static void add_sums(const struct run *run, struct trace_total *t, const struct 
     int lane, uint32_t n)
 {
     bool weights = run->mode & TRACE_WEIGHTS, colour = run->mode & TRACE_COLOUR;
+    double visible = run->mode & (TRACE_WEIGHTS | TRACE_SHARES) ? (double)sums->visible[lane]
+                                                                : sums->count[lane];
     t->samples += n;
     t->count += sums->count[lane];
     t->pairs += sums->pairs[lane];
     t->weight += weights ? sums->weight[lane] : n;
-    t->visible += weights ? sums->visible[lane] : sums->count[lane];
+    t->visible += visible;
     for (int c = 0; c < 3; c++)
-        t->rgb[c] += colour    ? (double)sums->rgb[c][lane]
-                     : weights ? (double)sums->visible[lane]
-                               : sums->count[lane];
+        t->rgb[c] += colour ? (double)sums->rgb[c][lane] : visible;
 }
 
 /* Standard error of the mean: see pen_trace_result. */
@@ -319,17 +319,18 @@ static void pretest_tile(void *context, uint32_t item)
     for (uint32_t first = 0; first < count; first += TRACE_LANES) {
         uint32_t lanes = load_pretest(run, &packet, receivers, first, count);
         struct trace_sums sums = {0}, rim = {0};
+        uint32_t mode = run->mode & TRACE_SHARES;
         for (int k = run->early ? 1 : 0; k < 2; k++)
-            trace_packet_run(
-                &run->emitter, &packet, &run->points.pretest[k], TRACE_COUNT_ONLY, &sums);
-        trace_packet_run(&run->emitter, &packet, &run->points.rim, TRACE_UNSHIFTED, &rim);
+            trace_packet_run(&run->emitter, &packet, &run->points.pretest[k], mode, &sums);
+        trace_packet_run(&run->emitter, &packet, &run->points.rim, mode | TRACE_UNSHIFTED, &rim);
         for (uint32_t lane = 0; lane < lanes; lane++) {
             uint32_t pixel = receivers[first + lane].pixel, seen = sums.count[lane];
             if (run->early)
                 seen = run->early[pixel] = (uint8_t)(run->early[pixel] + seen);
             seen += rim.count[lane];
+            bool dimmed = sums.visible[lane] + rim.visible[lane] > 0; /* seen through something */
             run->kept.verdicts[pixel] = seen == TRACE_PRETEST_NET + TRACE_PRETEST_RIM ? LIT
-                                        : seen == 0                                   ? UMBRA
+                                        : seen == 0 && !dimmed                        ? UMBRA
                                                                                       : MIXED;
         }
         rays += sums.rays + rim.rays;
@@ -519,7 +520,8 @@ bool pen_trace_visibility(struct pen_trace_scene *scene, const struct pen_trace_
     run.normal_stride = job->normal_stride ? job->normal_stride : 3;
     run.emitter = trace_emitter_of(light);
     run.mode = (run.emitter.emission ? TRACE_COLOUR : 0) |
-               (job->weighting == PEN_TRACE_G && !point ? TRACE_WEIGHTS : 0);
+               (job->weighting == PEN_TRACE_G && !point ? TRACE_WEIGHTS : 0) |
+               (scene->alpha.blends ? TRACE_SHARES : 0);
     struct trace_silhouette silhouette = {.shape = TRACE_BOTH_SIDES};
     if (job->front_only)
         silhouette = trace_silhouette_of(&run.emitter);

@@ -58,6 +58,9 @@ int main(int argc, char **argv)
         return EXIT_SETTINGS;
     }
     log_init(config.log_format.index);
+    /* For the workers: on a software device textures are cleared memory, and to get that in large
+     * pages takes a fifth of the time. */
+    setenv("GLIBC_TUNABLES", "glibc.malloc.hugetlb=1", 0);
     static sigset_t signals;
     sigemptyset(&signals);
     sigaddset(&signals, SIGTERM);

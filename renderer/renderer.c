@@ -50,6 +50,8 @@ struct pen_renderer *pen_renderer_create(
     r->ctx.gpu_memory = r->budget;
     r->ctx.shadow_memory = r->budget / 4;
     r->ctx.software = r->device.software;
+    r->ctx.is_called = config->is_called;
+    r->ctx.call_context = config->call_context;
     r->ctx.programs = gl_programs_create(config->programs);
     r->ctx.shadows = shadow_cache_create();
     r->ctx.histories = history_store_create(

@@ -13,6 +13,9 @@ struct pen_renderer_config {
     uint64_t gpu_memory_bytes; /* budget for scenes, images, shadow inputs and targets; 0: 2 GiB */
     double session_idle_ms;    /* how long a session is kept that nobody uses; 0: a minute */
     uint32_t programs;         /* most compiled programs kept between frames; 0: 256 */
+    /* Asked between two pieces of work; true ends the turn before its time. NULL: nobody is. */
+    bool (*is_called)(void *context);
+    void *call_context;
 };
 
 /* Every registered method; usable without a renderer and without a GPU. */

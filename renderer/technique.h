@@ -48,7 +48,9 @@ struct technique_speed {
 struct technique_ctx {
     struct technique_turns turns;
     struct technique_speed speeds[64];
-    uint32_t lane; /* number of this one */
+    uint32_t lane;                    /* number of this one */
+    bool (*is_called)(void *context); /* as pen_renderer_config has it */
+    void *call_context;
     struct gl_programs *programs;
     struct gl_samplers samplers;
     struct gl_timer timer;

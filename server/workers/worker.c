@@ -227,6 +227,14 @@ static bool take_message(
     }
 }
 
+/* Something has come from the daemon: what is in progress is not to keep it waiting. */
+static bool is_called(void *context)
+{
+    (void)context;
+    struct pollfd watch = {CHANNEL_WORKER_FD, POLLIN, 0};
+    return poll(&watch, 1, 0) > 0;
+}
+
 /* Returns the exit status once the daemon hangs up or the context is lost. */
 static int serve(struct worker *worker)
 {
@@ -270,7 +278,7 @@ static int fill_cache(const struct pen_renderer_config *config)
 
 int main(int argc, char **argv)
 {
-    struct pen_renderer_config config = {0};
+    struct pen_renderer_config config = {.is_called = is_called};
     static struct worker worker;
     enum worker_warm_up what = WORKER_NO_WARM_UP;
     for (int i = 1; i + 1 < argc; i += 2) {

@@ -186,6 +186,38 @@ static void check_giving_up(struct pen_renderer *r, const uint8_t scene[PEN_ID_B
     }
 }
 
+static bool count_call(void *context)
+{
+    ++*(uint32_t *)context;
+    return true;
+}
+
+/* Who is called comes back after each piece of work, whatever time there is. */
+static void check_calling(void)
+{
+    uint32_t calls = 0, turns = 1;
+    uint8_t scene[PEN_ID_BYTES];
+    struct pen_error error = {0};
+    struct pen_renderer *r = pen_renderer_create(
+        &(struct pen_renderer_config){.is_called = count_call, .call_context = &calls}, &error);
+    struct pen_request request;
+    struct pen_result result;
+    struct pen_frame frame;
+    fixture_scene(r, PEN_GENERATED_PLANAR_MASK, 0, 1, scene);
+    fixture_request(&request, scene, "multisample");
+    make_cheap(&request, 40);
+    uint64_t expected = whole(r, &request);
+    CHECK(calls == 0); /* in one piece means that */
+    pen_renderer_drop_shadows(r);
+    struct pen_render *render = pen_render_begin(r, &request, &frame, &result, &error);
+    while (!pen_render_advance(render, 1e9))
+        turns++;
+    CHECK(pen_render_end(render, &error) && hash_frame(&frame) == expected);
+    CHECK(turns > 12 && calls == turns - 1); /* G-buffer, maps, lookups, shading */
+    pen_frame_finish(&frame);
+    pen_renderer_destroy(r);
+}
+
 int main(void)
 {
     struct pen_error error;
@@ -201,6 +233,7 @@ int main(void)
     check_methods(r, scenes);
     check_giving_up(r, scenes[1]);
     pen_renderer_destroy(r);
+    check_calling();
     CHECK(gl_targets_bytes() == 0);
     CHECK_DONE();
 }

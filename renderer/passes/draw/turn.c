@@ -42,6 +42,12 @@ static bool is_time_up(const struct technique_turns *turns)
            (turns->stop_used_ms > 0 && used > turns->stop_used_ms);
 }
 
+static bool is_over(const struct technique_ctx *ctx, double now)
+{
+    return now - ctx->turns.since_ms >= ctx->turns.most_ms ||
+           (ctx->is_called && ctx->is_called(ctx->call_context));
+}
+
 bool pass_turn(struct technique_ctx *ctx, struct pen_error *error)
 {
     struct technique_turns *turns = &ctx->turns;
@@ -52,7 +58,7 @@ bool pass_turn(struct technique_ctx *ctx, struct pen_error *error)
         return true;
     follow_device(ctx);
     double now = gl_now_ms();
-    if (!turns->cancelled && now - turns->since_ms >= turns->most_ms) {
+    if (!turns->cancelled && is_over(ctx, now)) {
         turns->used_ms += now - turns->since_ms;
         gl_timer_stop(&ctx->timer);
         gl_fiber_pause(turns->fiber);

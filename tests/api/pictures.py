@@ -41,6 +41,37 @@ def read_png(data):
     return width, height, rows
 
 
+def chunk(kind, data):
+    return (struct.pack(">I", len(data)) + kind + data +
+            struct.pack(">I", zlib.crc32(kind + data)))
+
+
+def pack_row(values, depth):
+    if depth == 16:
+        return b"".join(struct.pack(">H", v) for v in values)
+    if depth == 8:
+        return bytes(values)
+    per = 8 // depth
+    values = list(values) + [0] * (-len(values) % per)
+    return bytes(sum(v << (8 - depth * (k + 1)) for k, v in enumerate(values[i:i + per]))
+                 for i in range(0, len(values), per))
+
+
+def png(rows, colour, depth, interlaced=False, *chunks):
+    """`rows` of pixels, each a tuple of samples. `chunks` stand before the data."""
+    height, width = len(rows), len(rows[0])
+    passes = ((0, 0, 8, 8), (4, 0, 8, 8), (0, 4, 4, 8), (2, 0, 4, 4), (0, 2, 2, 4), (1, 0, 2, 2),
+              (0, 1, 1, 2)) if interlaced else ((0, 0, 1, 1),)
+    data = b""
+    for x, y, dx, dy in passes:
+        for row in rows[y::dy]:
+            line = [s for pixel in row[x::dx] for s in pixel]
+            data += b"\0" + pack_row(line, depth) if line else b""
+    head = struct.pack(">IIBBBBB", width, height, depth, colour, 0, 0, interlaced)
+    return (b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + b"".join(chunks) +
+            chunk(b"IDAT", zlib.compress(data)) + chunk(b"IEND", b""))
+
+
 def rgb(answer):
     """Pixels of a PNG answer, row after row, as RGB triples."""
     return [pixel[:3] for row in read_png(answer.body)[2] for pixel in row]

@@ -10,7 +10,7 @@ import zlib
 
 import pictures
 from harness import Daemon, glb, main
-from pictures import box, off_by_more_than, read_png, rgb
+from pictures import box, chunk, off_by_more_than, png, read_png, rgb
 
 SIZE = (1, 0.75, 0.5)  # halves and quarters: exact in 16 bits, too
 VIEW = {"width": 120, "height": 90, "technique": {"name": "hard"}, "edges": "none"}
@@ -331,37 +331,6 @@ SHAPES = {
        for signs in itertools.product((1, -1), repeat=3) if min(signs) < 0}}
 
 
-def chunk(kind, data):
-    return (struct.pack(">I", len(data)) + kind + data +
-            struct.pack(">I", zlib.crc32(kind + data)))
-
-
-def pack_row(values, depth):
-    if depth == 16:
-        return b"".join(struct.pack(">H", v) for v in values)
-    if depth == 8:
-        return bytes(values)
-    per = 8 // depth
-    values = list(values) + [0] * (-len(values) % per)
-    return bytes(sum(v << (8 - depth * (k + 1)) for k, v in enumerate(values[i:i + per]))
-                 for i in range(0, len(values), per))
-
-
-def png(rows, colour, depth, interlaced=False, *chunks):
-    """`rows` of pixels, each a tuple of samples. `chunks` stand before the data."""
-    height, width = len(rows), len(rows[0])
-    passes = ((0, 0, 8, 8), (4, 0, 8, 8), (0, 4, 4, 8), (2, 0, 4, 4), (0, 2, 2, 4), (1, 0, 2, 2),
-              (0, 1, 1, 2)) if interlaced else ((0, 0, 1, 1),)
-    data = b""
-    for x, y, dx, dy in passes:
-        for row in rows[y::dy]:
-            line = [s for pixel in row[x::dx] for s in pixel]
-            data += b"\0" + pack_row(line, depth) if line else b""
-    head = struct.pack(">IIBBBBB", width, height, depth, colour, 0, 0, interlaced)
-    return (b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + b"".join(chunks) +
-            chunk(b"IDAT", zlib.compress(data)) + chunk(b"IEND", b""))
-
-
 def quadrant(x, y):
     return (x >= 16) + 2 * (y >= 16)
 
@@ -410,6 +379,8 @@ def textures():
                 ("palette 2", pixels(lambda q: (q,)), 3, 2, QUADRANTS, PALETTE),
                 ("palette 4", pixels(lambda q: (q,)), 3, 4, QUADRANTS, PALETTE),
                 ("palette 8", pixels(lambda q: (q,)), 3, 8, QUADRANTS, PALETTE),
+                ("palette of more than 2 bits can say", pixels(lambda q: (q,)), 3, 2, QUADRANTS,
+                 chunk(b"PLTE", (b"".join(bytes(c) for c in QUADRANTS) * 64)[:768])),
                 ("palette with alpha", pixels(lambda q: (q,)), 3, 8, QUADRANTS, PALETTE,
                  chunk(b"tRNS", b"\0\x80")),
                 ("a transparent colour", rgb8, 2, 8, QUADRANTS,
@@ -488,6 +459,22 @@ class Encodings(unittest.TestCase):
         for name, data, kind, want, off in textures():
             with self.subTest(name=name):
                 self.look(square(data, kind), want, off, "mislabelled" in name)
+
+    def test_damaged_texture(self):
+        """What there is of it is shown, with a warning; a picture without a row is plain."""
+        whole = png(pixels(lambda q: QUADRANTS[q]), 2, 8)
+        at = whole.index(b"IDAT")
+        data = zlib.decompress(whole[at + 4:-16])
+        for name, rows, checksum, want in (
+                ("a wrong checksum", 32, b"\0\0\0\0", QUADRANTS),
+                ("the lower half is missing", 16, b"", QUADRANTS[:2]), ("nothing", 0, b"", ())):
+            packer = zlib.compressobj()
+            packed = packer.compress(data[:97 * rows])
+            packed += packer.flush(zlib.Z_FINISH if checksum else zlib.Z_SYNC_FLUSH)
+            packed = packed[:-4] + checksum if checksum else packed
+            with self.subTest(name=name):
+                image = whole[:at - 4] + chunk(b"IDAT", packed) + chunk(b"IEND", b"")
+                self.look(square(image, "image/png"), want, 1, True)
 
     def test_places_of_textures(self):
         plain = png(pixels(lambda q: QUADRANTS[q]), 2, 8)

@@ -87,7 +87,7 @@ bool imp_image_decode(struct imp_bytes data, uint32_t width, uint32_t height, ui
     *rgba = pen_alloc_zero(bytes, 1);
     switch (imp_image_sniff(data)) {
     case IMP_PNG:
-        done = imp_png_decode(data, *rgba, bytes);
+        done = imp_png_decode(data, *rgba, bytes, damaged);
         break;
     case IMP_JPEG:
         done = imp_jpeg_decode(data, width, height, *rgba, damaged);
@@ -102,6 +102,7 @@ bool imp_image_decode(struct imp_bytes data, uint32_t width, uint32_t height, ui
         return true;
     free(*rgba);
     *rgba = NULL;
+    *damaged = false;
     return pen_fail(error, PEN_INVALID, "", "The image is damaged or truncated.");
 }
 

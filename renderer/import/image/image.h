@@ -15,8 +15,8 @@ bool imp_image_header(
     struct imp_bytes data, uint32_t *width, uint32_t *height, struct pen_error *error);
 
 /* The pixels as RGBA8, top row first; the caller frees *rgba. `width` and `height`
- * are what imp_image_header gave. *damaged tells that some pixels are missing (JPEG
- * only). Errors: PEN_INVALID. */
+ * are what imp_image_header gave. *damaged tells that some pixels are missing (PNG
+ * and JPEG). Errors: PEN_INVALID. */
 bool imp_image_decode(struct imp_bytes data, uint32_t width, uint32_t height, uint8_t **rgba,
     bool *damaged, struct pen_error *error);
 
@@ -26,7 +26,7 @@ void imp_image_halve(uint8_t *rgba, uint32_t *width, uint32_t *height, bool srgb
 
 /* image_png.c, image_jpeg.c, image_webp.c: what the functions above dispatch to. */
 bool imp_png_header(struct imp_bytes data, uint32_t *width, uint32_t *height);
-bool imp_png_decode(struct imp_bytes data, uint8_t *rgba, size_t rgba_bytes);
+bool imp_png_decode(struct imp_bytes data, uint8_t *rgba, size_t rgba_bytes, bool *damaged);
 bool imp_jpeg_header(struct imp_bytes data, uint32_t *width, uint32_t *height);
 bool imp_jpeg_decode(
     struct imp_bytes data, uint32_t width, uint32_t height, uint8_t *rgba, bool *damaged);

@@ -161,6 +161,16 @@ class Tolerant(unittest.TestCase):
                     with self.subTest(name=name, both=both):
                         self.check(document, data, word and word % name)
 
+    def test_names_are_told_as_they_are(self):
+        """In every script; only what cannot be seen on a page is left out."""
+        for name, told in (("\u6728\u7eb9.bin", None), ("stra\u00dfe/h\u00f6lzer.bin", None),
+                           ("a\u202eb\u0085c.bin", "a?b?c.bin"), ("\u6728" * 40, "\u6728" * 33)):
+            document, _ = parts(self.good)
+            document["buffers"][0]["uri"] = name
+            answer = self.post(json.dumps(document).encode())
+            self.assertEqual(answer.status, 422)
+            self.assertIn('"%s"' % (told or name), answer.json()["detail"])
+
     def test_refusals_say_what_to_do(self):
         packed = io.BytesIO()
         with zipfile.ZipFile(packed, "w") as z:

@@ -31,7 +31,7 @@ float scene_radius(const struct scene *s)
         float d = s->stage->content[1][i] - s->stage->content[0][i];
         sum += d * d;
     }
-    return has_content(s) ? fmaxf(0.5f * sqrtf(sum), 1e-9f) : 1;
+    return sum > 0 ? fmaxf(0.5f * sqrtf(sum), 1e-9f) : 1; /* of a single point, too */
 }
 
 void scene_center(const struct scene *s, float center[3])

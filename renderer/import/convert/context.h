@@ -1,6 +1,7 @@
 /* One conversion of a glTF document into a scene blob: what its parts share. */
 #pragma once
 #include "renderer/blob/builder.h"
+#include "renderer/import/base/text.h"
 #include "renderer/import/document/document.h"
 #include "renderer/import/document/gltf_tiny.h"
 
@@ -30,6 +31,12 @@ struct imp_context {
     uint64_t index_count, vertex_count, instance_count; /* against budget.h */
     uint64_t optimiser_work;                            /* what is left of IMP_MAX_OPTIMISER_WORK */
     uint32_t light_count, camera_count;
+    float brightest; /* of the lights' intensities */
+    struct imp_dim { /* the light of the least, but for none */
+        char name[sizeof(struct imp_text) + 12];
+        const char *unit;
+        float intensity;
+    } dimmest;
 
     uint32_t *primitives; /* psc number of each glTF primitive, or one of the two below */
     /* psc number of each glTF material and, last, of none; UINT32_MAX: not yet. */

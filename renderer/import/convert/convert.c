@@ -1,6 +1,7 @@
 #include "renderer/import/convert/convert.h"
 #include "protocol/memory.h"
 #include "renderer/import/base/budget.h"
+#include "renderer/import/convert/light.h"
 #include "renderer/import/convert/marks.h"
 #include "renderer/import/convert/material.h"
 #include "renderer/import/convert/mesh.h"
@@ -51,6 +52,7 @@ bool imp_convert(struct imp_document *document, struct gltf_model *model,
     if (!context.instance_count)
         imp_warn(&context, "The scene draws nothing.");
     imp_variants_close(&context);
+    imp_lights_close(&context);
     done = imp_add_images(&context, error);
 fail:
     free(context.primitives);

@@ -4,10 +4,10 @@
 #include "renderer/import/base/name.h"
 #include "renderer/import/base/text.h"
 #include "renderer/pose/place.h"
+#include <stdio.h>
 #include <string.h>
 
-#define DIM_CANDELA 5 /* no lamp for a room is this weak: the file must mean something else */
-#define DIM_LUX 20
+#define HARDLY_SEEN 1000 /* beside what is so many times as bright, which exposure suits */
 
 /* As enum gltf_light_type; PEN_LIGHT_TYPES: none. */
 static const uint32_t types[] = {[GLTF_LIGHT_UNKNOWN] = PEN_LIGHT_TYPES,
@@ -46,7 +46,6 @@ uint32_t imp_add_light(struct imp_context *context, const struct gltf_light *lig
     const struct psc_light_rest rest = imp_light_rest(light);
     float size[2];
     imp_light_size(light, size);
-    bool sun = light->type == GLTF_LIGHT_DIRECTIONAL;
     pen_light_default(&to.light, types[light->type]);
     pose_light_power(&to.light, &rest);
     if (!pose_place_light(&to.light, world, size)) {
@@ -54,13 +53,15 @@ uint32_t imp_add_light(struct imp_context *context, const struct gltf_light *lig
         return IMP_SKIPPED;
     }
     imp_name(to.name, node->name, light->name);
-    bool point = light->type == GLTF_LIGHT_POINT || light->type == GLTF_LIGHT_SPOT;
+    if (light->intensity > context->brightest)
+        context->brightest = light->intensity;
     if (light->intensity > 0 &&
-        ((point && light->intensity < DIM_CANDELA) || (sun && light->intensity < DIM_LUX)))
-        imp_warn(context,
-            "The light \"%s\" has only %g %s, read as the unit that glTF prescribes; it will look "
-            "dark beside lights given in watts.",
-            imp_text(to.name).s, (double)light->intensity, sun ? "lux" : "cd");
+        (!context->dimmest.name[0] || light->intensity < context->dimmest.intensity)) {
+        context->dimmest.intensity = light->intensity;
+        context->dimmest.unit = light->type == GLTF_LIGHT_DIRECTIONAL ? "lux" : "cd";
+        snprintf(context->dimmest.name, sizeof context->dimmest.name,
+            to.name[0] ? "The light \"%s\"" : "A light", imp_text(to.name).s);
+    }
     if (hidden) /* until an animation shows it */
         memset(to.light.color, 0, sizeof to.light.color);
     uint32_t psc = psc_builder_add_light(context->builder, &to);
@@ -68,4 +69,14 @@ uint32_t imp_add_light(struct imp_context *context, const struct gltf_light *lig
         imp_warn(context, "A request that gives no lights uses only the first %d of the scene's.",
             PEN_MAX_LIGHTS);
     return psc;
+}
+
+void imp_lights_close(struct imp_context *context)
+{
+    if (context->dimmest.name[0] && context->brightest > HARDLY_SEEN * context->dimmest.intensity)
+        imp_warn(context,
+            "%s has %g %s, read as the unit that glTF prescribes; beside one that is %.0f times as "
+            "bright it will hardly be seen.",
+            context->dimmest.name, (double)context->dimmest.intensity, context->dimmest.unit,
+            (double)(context->brightest / context->dimmest.intensity));
 }

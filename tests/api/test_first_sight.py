@@ -5,7 +5,7 @@ import unittest
 
 import harness
 from harness import Daemon
-from pictures import box, mesh_scene, off_by_more_than, rgb
+from pictures import box, mesh_scene, off_by_more_than, png, pose_files, rgb
 
 SIZE = {"width": 160, "height": 120}
 
@@ -47,6 +47,45 @@ def wedge():
     return points, normals, indices
 
 
+def random_matrix(rng):
+    """Every number is a multiple of 1/64, so that floats hold what it makes of such numbers."""
+    while True:
+        m = [[rng.randint(-96, 96) / 64 for _ in range(3)] for _ in range(3)]
+        if abs(determinant(m)) > 0.2:
+            return m
+
+
+def columns_of(m, move=(0, 0, 0)):
+    return [m[r][c] if r < 3 else 0 for c in range(3) for r in range(4)] + list(move) + [1]
+
+
+# Half a turn about the normal apart, so that one is what the other looks like from behind.
+TILTS = ((208, 168, 218), (48, 88, 218))
+
+
+def bent(points, normals, tangents, indices, tilt, **node):
+    """A shape in which a normal map of one colour bends every normal; the node may have instances."""
+    b = pose_files.Builder()
+    corners = ([0, 0], [1, 0], [1, 1], [0, 1])
+    b.json["images"] = [{"bufferView": b.view(png([[tilt]], 2, 8)), "mimeType": "image/png"}]
+    b.json["textures"] = [{"source": 0}]
+    b.json["materials"] = [{"doubleSided": True, "normalTexture": {"index": 0}}]
+    attributes = {"POSITION": b.floats("VEC3", points), "NORMAL": b.floats("VEC3", normals),
+                  "TEXCOORD_0": b.floats("VEC2", [corners[k % 4] for k in range(len(points))])}
+    if tangents:
+        attributes["TANGENT"] = b.floats("VEC4", tangents)
+    b.json["meshes"] = [{"primitives": [{
+        "attributes": attributes, "material": 0,
+        "indices": b.accessor("SCALAR", 5123, "H", [[i] for i in indices])}]}]
+    if "instance" in node:
+        b.json["extensionsUsed"] = ["EXT_mesh_gpu_instancing"]
+        attributes = {k: b.floats("VEC4" if k == "ROTATION" else "VEC3", [v])
+                      for k, v in node.pop("instance").items()}
+        node["extensions"] = {"EXT_mesh_gpu_instancing": {"attributes": attributes}}
+    b.node(True, mesh=0, **node)
+    return b.glb()
+
+
 class FirstSight(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
@@ -69,10 +108,7 @@ class FirstSight(unittest.TestCase):
         request = {**SIZE, "width": 96, "height": 72, "technique": {"name": "raytraced"}}
         mirrors = 0
         for n in range(50):
-            while True:
-                m = [[rng.randint(-96, 96) / 64 for _ in range(3)] for _ in range(3)]
-                if abs(determinant(m)) > 0.2:
-                    break
+            m = random_matrix(rng)
             move = [rng.randint(-64, 64) / 64 for _ in range(3)]
             turned = inverse_transpose(m)
             mirrored = determinant(m) < 0
@@ -82,11 +118,77 @@ class FirstSight(unittest.TestCase):
                 [unit(multiply(turned, v)) for v in normals],
                 [i for k in range(0, len(indices), 3)
                  for i in (indices[k:k + 3][::-1] if mirrored else indices[k:k + 3])])
-            columns = [m[r][c] if r < 3 else 0 for c in range(3) for r in range(4)] + move + [1]
-            placed = mesh_scene(points, normals, indices, node={"matrix": columns})
+            placed = mesh_scene(points, normals, indices, node={"matrix": columns_of(m, move)})
             a, b = (rgb(self.d.render(self.d.upload(file), request)) for file in (placed, baked))
             self.assertEqual(off_by_more_than(a, b, 8), 0, "transform %d: %s" % (n, m))
         self.assertGreater(mirrors, 10)
+
+    def same_normals(self, *files):
+        request = {"width": 96, "height": 72, "technique": {"name": "none"},
+                   "output": {"layer": "normal"}}
+        a, b = (self.picture(self.d.upload(file), **request) for file in files)
+        self.assertEqual(off_by_more_than(a, b, 8), 0)
+
+    def test_normal_maps_are_the_baked_ones(self):
+        """A mirror turns the bitangent round, which the file's tangents say by w; given tangents, made
+        ones, and those of instances."""
+        points, normals, indices = wedge()
+        tangents = []
+        for k, n in enumerate(normals):
+            first = points[k - k % 4:k - k % 4 + 2]
+            along = [b - a for a, b in zip(*first)]
+            dot = sum(a * b for a, b in zip(along, n))
+            tangents.append(unit([a - dot * b for a, b in zip(along, n)]) + [1])
+        flat = [unit([y[(k + 1) % 3] * z[(k + 2) % 3] - y[(k + 2) % 3] * z[(k + 1) % 3]
+                      for k in range(3)])
+                for f in range(0, 24, 4)
+                for y, z in [[[b - a for a, b in zip(points[f + i], points[f + i + 1])]
+                              for i in (0, 1)]] for _ in range(4)]
+        rng = random.Random(9)
+        mirrors = 0
+        for n in range(12):
+            turn, size = unit([rng.gauss(0, 1) for _ in range(4)]), [
+                rng.choice((-1, 1)) * rng.randint(16, 96) / 64 for _ in range(3)]
+            m = random_matrix(rng)
+            if n % 3 == 0:
+                x, y, z, w = turn
+                m = [[(1 - 2 * (y * y + z * z)) * size[0], 2 * (x * y - z * w) * size[1],
+                      2 * (x * z + y * w) * size[2]],
+                     [2 * (x * y + z * w) * size[0], (1 - 2 * (x * x + z * z)) * size[1],
+                      2 * (y * z - x * w) * size[2]],
+                     [2 * (x * z - y * w) * size[0], 2 * (y * z + x * w) * size[1],
+                      (1 - 2 * (x * x + y * y)) * size[2]]]
+            turned, mirrored = inverse_transpose(m), determinant(m) < 0
+            mirrors += mirrored
+            given, used = (tangents, normals) if n % 3 < 2 else (None, flat)
+            node = {"matrix": columns_of(m)} if n % 3 else {
+                "instance": {"ROTATION": turn, "SCALE": size}}
+            baked = [unit(multiply(m, t[:3])) + [-1 if mirrored else 1] for t in given or ()]
+            with self.subTest(transform=n):
+                self.same_normals(
+                    bent(points, used, given, indices, TILTS[0], **node),
+                    bent([multiply(m, p) for p in points], [unit(multiply(turned, v)) for v in used],
+                         baked, [i for k in range(0, len(indices), 3) for i in
+                                 (indices[k:k + 3][::-1] if mirrored else indices[k:k + 3])],
+                         TILTS[0]))
+        self.assertGreater(mirrors, 3)
+
+    def test_normal_maps_from_behind(self):
+        """A bump is a dent there, leaning the same way in the world."""
+        sheet, order = [[-1, -1, 0], [-1, 1, 0], [1, 1, 0], [1, -1, 0]], [0, 1, 2, 0, 2, 3]
+        up = [0, 1, 0]
+        self.same_normals(
+            bent(sheet, [[0, 0, -1]] * 4, [up + [1]] * 4, order, TILTS[0]),
+            bent(sheet, [[0, 0, 1]] * 4, [up + [-1]] * 4, order[::-1], TILTS[1]))
+
+    def test_nothing_but_a_point_shows_the_ground(self):
+        """Triangles without any extent."""
+        request = {"technique": "pcss"}
+        seen = [self.picture(self.d.upload(mesh_scene(p, [[0, 1, 0]] * 3, [0, 1, 2])), **request)
+                for p in ([[1, 1, 1]] * 3, [[0, 0, 0]] * 3)]
+        for picture in seen:
+            self.assertGreater(min(min(p) for p in picture), 100)
+            self.assertEqual(off_by_more_than(picture, seen[0], 2), 0)
 
     def test_white_box_from_all_sides(self):
         scene = self.d.upload(mesh_scene(*box()))
@@ -123,13 +225,27 @@ class FirstSight(unittest.TestCase):
             self.assertLess(abs(rows[0] + rows[-1] + 1 - SIZE["height"]), 6, size)
             self.assertLess(abs(columns[0] + columns[-1] + 1 - SIZE["width"]), 6, size)
 
+    def lit_by(self, *lights):
+        """A grey box (albedo 0.5) with the file's own lights, each with its node's place."""
+        nodes = [{"extensions": {"KHR_lights_punctual": {"light": i}}, **node}
+                 for i, (_, node) in enumerate(lights)]
+        return self.d.call("POST", "/v1/scenes", mesh_scene(
+            *box(), color=(0.5, 0.5, 0.5, 1), nodes=nodes, extensionsUsed=["KHR_lights_punctual"],
+            extensions={"KHR_lights_punctual": {"lights": [light for light, _ in lights]}}),
+            {"Content-Type": "model/gltf-binary"}).json()
+
+    def test_a_light_that_cannot_be_seen_is_said(self):
+        for power, warned in ((99, False), (4e4, True)):
+            info = self.lit_by(({"type": "directional", "intensity": power}, {}),
+                               ({"type": "point", "intensity": 5, "name": "L\u00e4mpchen"}, {}))
+            self.assertEqual(len(info["warnings"]), warned, info["warnings"])
+            self.assertTrue(not warned or "\"L\u00e4mpchen\" has 5 cd" in info["warnings"][0])
+
     def lit_mean(self, light, node):
-        """Mean of the pixels of a grey box (albedo 0.5) that the file's own light reaches."""
-        file = mesh_scene(*box(), color=(0.5, 0.5, 0.5, 1),
-                          nodes=[{"extensions": {"KHR_lights_punctual": {"light": 0}}, **node}],
-                          extensionsUsed=["KHR_lights_punctual"],
-                          extensions={"KHR_lights_punctual": {"lights": [light]}})
-        scene = self.d.upload(file)
+        """Mean of the pixels of the box that the file's own light reaches."""
+        info = self.lit_by((light, node))
+        self.assertEqual(info["warnings"], [])
+        scene = info["id"]
         lit = self.picture(scene, output={"layer": "visibility"}, ground=False)
         none = self.picture(scene, output={"layer": "normal"}, ground=False)
         beauty = self.picture(scene, ground=False)

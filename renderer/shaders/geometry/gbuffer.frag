@@ -57,8 +57,8 @@ void main()
     vec3 shading = normalize(v_normal);
     if (!(dot(shading, shading) > 0.5))
         shading = geometric;
-    if (dot(shading, geometric) < 0.0)
-        shading = -shading;
+    float side = dot(shading, geometric) < 0.0 ? -1.0 : 1.0;
+    shading *= side;
     // Derivatives of single-precision positions are good to about 1e-3; where the vertex normal
     // says the same (a flat face) it is the more exact one, and receiver planes need that at
     // grazing light.
@@ -114,9 +114,10 @@ void main()
     if (material_has(v_material, SCENE_UNIT_NORMAL) && dot(v_tangent.xyz, v_tangent.xyz) > 0.0) {
         vec3 t = material_sample(normal_map, v_material, SCENE_UNIT_NORMAL, v_uv).xyz * 2.0 - 1.0;
         t.xy *= m.surface.w;
+        // From behind a surface bends the same way: all three vectors are turned round.
         vec3 tangent = normalize(v_tangent.xyz - shading * dot(v_tangent.xyz, shading));
         vec3 bitangent = cross(shading, tangent) * v_tangent.w;
-        vec3 bent = normalize(tangent * t.x + bitangent * t.y + shading * t.z);
+        vec3 bent = normalize(side * tangent * t.x + bitangent * t.y + shading * t.z);
         if (dot(bent, bent) > 0.5)
             shading = bent;
     }

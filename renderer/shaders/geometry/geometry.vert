@@ -49,10 +49,11 @@ void main()
     // length before they are interpolated, as if the vertices had been transformed in the file.
     v_normal = vec3(dot(cross(row1.xyz, row2.xyz), normal.xyz),
         dot(cross(row2.xyz, row0.xyz), normal.xyz), dot(cross(row0.xyz, row1.xyz), normal.xyz));
-    v_normal *= (dot(row0.xyz, cross(row1.xyz, row2.xyz)) < 0.0 ? -1.0 : 1.0) *
-                inversesqrt(max(dot(v_normal, v_normal), 1e-36));
+    float side = dot(row0.xyz, cross(row1.xyz, row2.xyz)) < 0.0 ? -1.0 : 1.0;
+    v_normal *= side * inversesqrt(max(dot(v_normal, v_normal), 1e-36));
+    // What mirrors turns the cross product round that gives the bitangent.
     v_tangent = vec4(dot(row0.xyz, tangent.xyz), dot(row1.xyz, tangent.xyz),
-        dot(row2.xyz, tangent.xyz), tangent.w);
+        dot(row2.xyz, tangent.xyz), tangent.w * side);
 #endif
 #endif
 #ifdef FULL

@@ -14,10 +14,11 @@ libembree-dev
 libisal-dev
 libmeshoptimizer-dev
 libmicrohttpd-dev
-libopenimageio-dev
+libopenexr-dev
 libseccomp-dev
 libspng-dev
 libssl-dev
+libtiff-dev
 libtinygltf-dev
 libturbojpeg0-dev
 libutf8proc-dev

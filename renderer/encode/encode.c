@@ -1,7 +1,9 @@
 #include "renderer/encode/encode.h"
-#include "renderer/encode/oiio_shim.h"
+#include "renderer/encode/exr_shim.h"
+#include "renderer/encode/jpeg.h"
 #include "renderer/encode/pixels.h"
 #include "renderer/encode/png_fast.h"
+#include "renderer/encode/tiff.h"
 #include "renderer/encode/webp.h"
 #include <stdio.h>
 #include <stdlib.h>
@@ -16,28 +18,21 @@ static uint32_t bits_of(const struct pen_output *output)
 
 struct source {
     const struct pen_frame *frame;
-    uint32_t plane_count;
-    uint32_t channels[PEN_LAYERS]; /* written of each plane */
-    enum pixels_sample stored[PEN_LAYERS];
-    uint32_t total; /* channels of the file */
+    enum pixels_sample stored[PEN_LAYERS]; /* HALF or FLOAT of each plane */
+    uint32_t total;                        /* channels of the file */
 };
-
-static size_t sample_bytes(enum pixels_sample sample)
-{
-    return sample == PIXELS_U8 ? 1 : sample == PIXELS_U16 ? 2 : 4;
-}
 
 static void fill_rows(void *user, uint32_t first, uint32_t count, void *out)
 {
     const struct source *source = user;
     uint32_t width = source->frame->width;
     for (uint32_t y = 0; y < count; y++) {
-        size_t at = (size_t)y * width * source->total;
-        for (uint32_t p = 0; p < source->plane_count; p++) {
-            pixels_row(&source->frame->planes[p], width, first + y, source->channels[p],
-                source->stored[p], source->total,
-                (uint8_t *)out + at * sample_bytes(source->stored[p]));
-            at += source->channels[p];
+        float *at = (float *)out + (size_t)y * width * source->total;
+        for (uint32_t p = 0; p < source->frame->plane_count; p++) {
+            const struct pen_plane *plane = &source->frame->planes[p];
+            pixels_row(
+                plane, width, first + y, plane->channels, source->stored[p], source->total, at);
+            at += plane->channels;
         }
     }
 }
@@ -62,50 +57,52 @@ static void name_channels(
 }
 
 static bool encode_exr(const struct pen_frame *frame, const struct pen_output *output,
-    struct oiio_file *file, struct pen_bytes *bytes, struct pen_error *error)
+    const char *const *attributes, uint32_t attribute_count, struct pen_bytes *bytes,
+    struct pen_error *error)
 {
-    struct source source = {.frame = frame, .plane_count = frame->plane_count};
+    struct source source = {.frame = frame};
+    struct exr_file file = {.width = frame->width,
+        .height = frame->height,
+        .attributes = attributes,
+        .attribute_count = attribute_count};
     for (uint32_t p = 0; p < frame->plane_count; p++) {
         const struct pen_plane *plane = &frame->planes[p];
         bool wide = output->bit_depth == 32 ||
                     (output->bit_depth == 0 && plane->pixel == PEN_PIXEL_RGBA32F);
-        source.channels[p] = plane->channels;
-        file->bt709 |= !strcmp(plane->name, pen_layers[PEN_LAYER_BEAUTY].name);
+        file.bt709 |= !strcmp(plane->name, pen_layers[PEN_LAYER_BEAUTY].name);
         source.stored[p] = wide ? PIXELS_FLOAT : PIXELS_HALF;
-        name_channels(plane, plane->channels, frame->plane_count > 1, &file->names[source.total]);
+        name_channels(plane, plane->channels, frame->plane_count > 1, &file.names[source.total]);
         for (uint32_t c = 0; c < plane->channels; c++)
-            file->stored[source.total + c] = source.stored[p];
+            file.half[source.total + c] = !wide;
         source.total += plane->channels;
     }
-    file->extension = "exr";
-    file->compression = "zip";
-    file->sample = PIXELS_FLOAT;
-    file->channels = source.total;
-    return oiio_write(file, fill_rows, &source, bytes, error);
+    file.channels = source.total;
+    return exr_write(&file, fill_rows, &source, bytes, error);
 }
 
-static bool encode_integers(const struct pen_frame *frame, const struct pen_output *output,
-    struct oiio_file *file, struct pen_bytes *bytes, struct pen_error *error)
+/* The attributes as lines of one text; NULL: no memory. */
+static char *describe(const char *const *attributes, uint32_t count)
 {
-    char compression[24];
-    struct source source = {.frame = frame, .plane_count = 1};
-    uint32_t channels = frame->planes[0].channels;
-    if (output->format == PEN_TIFF) {
-        file->extension = "tif";
-        snprintf(compression, sizeof compression, "zip:1"); /* for speed, as all that is sent */
-    } else {
-        file->extension = "jpg";
-        snprintf(compression, sizeof compression, "jpeg:%u", output->quality);
-        channels = channels == 4 ? 3 : channels;
-    }
-    file->attributes_as_description = true;
-    file->compression = compression;
-    file->sample = bits_of(output) == 16 ? PIXELS_U16 : PIXELS_U8;
-    file->channels = source.total = source.channels[0] = channels;
-    source.stored[0] = file->sample;
-    bool written = oiio_write(file, fill_rows, &source, bytes, error);
-    file->compression = NULL; /* it ends here */
-    return written;
+    size_t size = 1;
+    for (uint32_t i = 0; i < count; i++)
+        size += strlen(attributes[i]) + 1;
+    char *text = calloc(1, size), *at = text;
+    for (uint32_t i = 0; text && i < count; i++)
+        at += sprintf(at, "%s%s", i ? "\n" : "", attributes[i]);
+    return text;
+}
+
+static bool encode_described(const struct pen_frame *frame, const struct pen_output *output,
+    const char *const *attributes, uint32_t attribute_count, struct pen_bytes *bytes,
+    struct pen_error *error)
+{
+    char *text = describe(attributes, attribute_count);
+    if (!text)
+        return pen_fail(error, PEN_INTERNAL, "", "The image could not be encoded: out of memory.");
+    bool ok = output->format == PEN_TIFF ? tiff_encode(frame, bits_of(output), text, bytes, error)
+                                         : jpeg_encode(frame, output->quality, text, bytes, error);
+    free(text);
+    return ok;
 }
 
 static bool is_sound(const struct pen_frame *frame, const struct pen_output *output)
@@ -142,11 +139,7 @@ bool pen_encode(const struct pen_frame *frame, const struct pen_output *output,
         return png_fast_encode(frame, bits_of(output), attributes, attribute_count, bytes, error);
     if (output->format == PEN_WEBP)
         return webp_encode(frame, output->quality, bytes, error);
-    struct oiio_file file = {.width = frame->width,
-        .height = frame->height,
-        .attributes = attributes,
-        .attribute_count = attribute_count};
     if (output->format == PEN_EXR)
-        return encode_exr(frame, output, &file, bytes, error);
-    return encode_integers(frame, output, &file, bytes, error);
+        return encode_exr(frame, output, attributes, attribute_count, bytes, error);
+    return encode_described(frame, output, attributes, attribute_count, bytes, error);
 }

@@ -12,14 +12,7 @@
 /* libwebp's writer must be freed by libwebp, our bytes with free(): so an own writer. */
 static int append(const uint8_t *data, size_t size, const WebPPicture *picture)
 {
-    struct pen_bytes *bytes = picture->custom_ptr;
-    uint8_t *grown = realloc(bytes->data, bytes->size + size);
-    if (!grown)
-        return 0;
-    memcpy(grown + bytes->size, data, size);
-    bytes->data = grown;
-    bytes->size += size;
-    return 1;
+    return bytes_file_write(picture->custom_ptr, data, size);
 }
 
 /* RGBA rows as the library wants them: grey is repeated, alpha is 255 unless it is meant. */
@@ -44,6 +37,7 @@ bool webp_encode(const struct pen_frame *frame, uint32_t quality, struct pen_byt
 {
     WebPConfig config;
     WebPPicture picture;
+    struct bytes_file file = {0};
     if (!WebPConfigInit(&config) || !WebPPictureInit(&picture))
         return pen_fail(error, PEN_INTERNAL, "", "The installed libwebp does not fit this build.");
     if (quality >= 100) {
@@ -57,7 +51,7 @@ bool webp_encode(const struct pen_frame *frame, uint32_t quality, struct pen_byt
     picture.width = (int)frame->width;
     picture.height = (int)frame->height;
     picture.writer = append;
-    picture.custom_ptr = bytes;
+    picture.custom_ptr = &file;
     uint8_t *rgba = to_rgba(frame);
     bool alpha = frame->planes[0].channels == 4;
     int stride = (int)frame->width * 4;
@@ -67,9 +61,11 @@ bool webp_encode(const struct pen_frame *frame, uint32_t quality, struct pen_byt
               WebPEncode(&config, &picture);
     WebPPictureFree(&picture);
     free(rgba);
-    if (ok)
+    if (ok) {
+        *bytes = file.bytes;
         return true;
-    pen_bytes_finish(bytes);
+    }
+    pen_bytes_finish(&file.bytes);
     return pen_fail(error, PEN_INTERNAL, "",
         "The WebP file could not be encoded (libwebp error %d).", (int)picture.error_code);
 }

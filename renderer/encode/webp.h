@@ -1,5 +1,4 @@
-/* WebP files. Not through OpenImageIO: its writer knows no grey, changes lossless pixels that have
- * alpha, and always runs libwebp's slowest search. */
+/* WebP files. */
 #pragma once
 #include "renderer/encode/bytes.h"
 #include "renderer/picture.h"

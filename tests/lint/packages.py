@@ -12,7 +12,8 @@ CMAKE = {
     "threads": None, "m": None, "dl": None, "rt": None,
     "pkgconfig": "pkgconf", "python3": "python3", "curl": "libcurl4-openssl-dev",
     "libcurl": "libcurl4-openssl-dev", "libmicrohttpd": "libmicrohttpd-dev",
-    "libcjson": "libcjson-dev", "cjson": "libcjson-dev", "openimageio": "libopenimageio-dev",
+    "libcjson": "libcjson-dev", "cjson": "libcjson-dev", "openexr": "libopenexr-dev",
+    "libtiff-4": "libtiff-dev",
     "libisal": "libisal-dev", "libwebp": "libwebp-dev", "libwebpdecoder": "libwebp-dev",
     "spng": "libspng-dev", "libspng": "libspng-dev", "libutf8proc": "libutf8proc-dev",
     "draco": "libdraco-dev", "draco/compression/decode.h": "libdraco-dev",
@@ -30,7 +31,8 @@ CMAKE = {
 }
 HEADERS = {
     "microhttpd.h": "libmicrohttpd-dev", "cjson/*": "libcjson-dev", "tiny_gltf.h": "libtinygltf-dev",
-    "nlohmann/*": "nlohmann-json3-dev", "OpenImageIO/*": "libopenimageio-dev",
+    "nlohmann/*": "nlohmann-json3-dev", "Imf*.h": "libopenexr-dev",
+    "tiffio.h": "libtiff-dev",
     "cglm/*": "libcglm-dev", "meshoptimizer.h": "libmeshoptimizer-dev", "embree[34]/*": "libembree-dev",
     "isa-l.h": "libisal-dev", "isa-l/*": "libisal-dev", "GL/*": "libgl-dev", "EGL/*": "libegl-dev",
     "seccomp.h": "libseccomp-dev", "zip.h": "libzip-dev", "webp/*": "libwebp-dev",

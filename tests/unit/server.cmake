@@ -11,7 +11,7 @@ if(PENUMBRA_DAEMON)
     # A daemon that no driver may take down does not load one. Sanitizers bring libraries of their own.
     if(NOT PENUMBRA_SANITIZE)
         add_test(NAME unit.penumbrad_links COMMAND bash -c
-            "libraries=$(ldd '$<TARGET_FILE:penumbrad>') && ! grep -E 'embree|GL|OSMesa|tbb|OpenImageIO|stdc[+]' <<<\"$libraries\"")
+            "libraries=$(ldd '$<TARGET_FILE:penumbrad>') && ! grep -E 'embree|GL|OSMesa|tbb|OpenEXR|tiff|stdc[+]' <<<\"$libraries\"")
         set_tests_properties(unit.penumbrad_links PROPERTIES LABELS unit TIMEOUT 60)
     endif()
 endif()

@@ -188,6 +188,7 @@ def check_integers(tool, kind, reader, bits, pixel, channels, width, height):
         assert colours == {b"sRGB": b"\0", b"gAMA": struct.pack(">I", 45455), b"cHRM": struct.pack(
             ">8I", 31270, 32900, 64000, 33000, 30000, 60000, 15000, 6000)}, colours
     else:
+        assert extra.get(338) == ((2,) if channels == 4 else None), extra  # unassociated alpha
         assert b"technique=pcss" in extra[270] and 306 not in extra, extra  # 306: the time
     print(kind, bits, "bit", channels, "channels", width, "x", height, len(data), "bytes: same")
 

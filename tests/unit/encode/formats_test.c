@@ -45,6 +45,16 @@ static double worst(const struct pen_frame *frame, const uint8_t *decoded, uint3
     return most;
 }
 
+/* The comment's segment (ITU-T T.81, B.2.4.5) follows JFIF's. */
+static void check_comment(const struct pen_bytes *jpeg, const char *want)
+{
+    const uint8_t *p = jpeg->data + 2;
+    CHECK(jpeg->size > 64 && p[0] == 0xff && p[1] == 0xe0);
+    p += 2 + (p[2] << 8 | p[3]);
+    CHECK(p[0] == 0xff && p[1] == 0xfe && (p[2] << 8 | p[3]) == (int)strlen(want) + 2);
+    CHECK(!memcmp(p + 4, want, strlen(want)));
+}
+
 static void jpeg(uint32_t width, uint32_t height, uint32_t channels)
 {
     struct pen_frame frame;
@@ -54,6 +64,7 @@ static void jpeg(uint32_t width, uint32_t height, uint32_t channels)
     int w, h, sampling, space;
     CHECK(tjDecompressHeader3(tj, bytes.data, bytes.size, &w, &h, &sampling, &space) == 0);
     CHECK(w == (int)width && h == (int)height);
+    check_comment(&bytes, "technique=pcss");
     CHECK((space == TJCS_GRAY) == (channels == 1));
     uint32_t decoded_channels = channels == 1 ? 1 : 3;
     uint8_t *decoded = malloc((size_t)width * height * 3);
@@ -162,8 +173,8 @@ static int count_threads(void)
 
 int main(void)
 {
-    int threads_before = count_threads(); /* a library of OpenImageIO's starts some when loaded */
-    threads();                            /* first, so that first-use initialisation is raced for */
+    int threads_before = count_threads();
+    threads(); /* first, so that first-use initialisation is raced for */
     CHECK(count_threads() == threads_before); /* no pool is kept behind our back */
     jpeg(160, 120, 3);
     jpeg(160, 120, 4);

@@ -5,6 +5,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* Materials that are bound together. */
+#define WINDOW (sizeof(struct materials_block) / sizeof(struct material_record))
+
 /* Instance attribute: three matrix rows and the material, 64 bytes. */
 struct instance_record {
     float rows[12];
@@ -54,8 +57,9 @@ static void put_buffer(struct scene *s, GLuint *buffer, const void *data, size_t
 
 static void upload_materials(struct scene *s)
 {
-    uint32_t n = s->blob.material_count;
-    struct material_record *records = pen_alloc_zero(n, sizeof *records);
+    uint32_t n = s->blob.material_count,
+             room = n + (uint32_t)WINDOW; /* the last binding ends there */
+    struct material_record *records = pen_alloc_zero(room, sizeof *records);
     for (uint32_t i = 0; i < n; i++) {
         const struct psc_material *m = &s->blob.materials[i];
         struct material_record *r = &records[i];
@@ -77,7 +81,7 @@ static void upload_materials(struct scene *s)
         }
         s->may_blend |= m->alpha_mode == PSC_BLEND;
     }
-    put_buffer(s, &s->materials, records, n * sizeof *records);
+    put_buffer(s, &s->materials, records, room * sizeof *records);
     free(records);
 }
 
@@ -87,7 +91,7 @@ static void upload_instances(struct scene *s)
     struct instance_record *records = pen_alloc_zero(n, sizeof *records);
     for (uint32_t i = 0; i < s->blob.instance_count; i++) {
         memcpy(records[i].rows, s->blob.instances[i].world, 48);
-        records[i].material = s->blob.primitives[s->blob.instances[i].primitive].material;
+        records[i].material = s->blob.primitives[s->blob.instances[i].primitive].material % WINDOW;
     }
     put_buffer(s, &s->instances, records, n * sizeof *records);
     free(records);
@@ -191,13 +195,12 @@ static bool is_closed(const struct scene *s, uint32_t instance)
 static uint64_t state_key(const struct scene *s, uint32_t instance)
 {
     const struct psc_material *m = material_of(s, instance);
-    bool alpha = m->alpha_mode != PSC_OPAQUE;
-    uint64_t textured = has_textures(m) || alpha
-                            ? 1 + s->blob.primitives[s->blob.instances[instance].primitive].material
-                            : 0;
+    bool alpha = m->alpha_mode != PSC_OPAQUE, textured = alpha || has_textures(m);
+    uint32_t material = s->blob.primitives[s->blob.instances[instance].primitive].material;
     return (uint64_t)is_closed(s, instance) << 41 | (uint64_t)alpha << 40 |
            (uint64_t)((m->flags & PSC_DOUBLE_SIDED) != 0) << 39 |
-           (uint64_t)(s->blob.instances[instance].flags & PSC_MIRRORED) << 38 | textured;
+           (uint64_t)(s->blob.instances[instance].flags & PSC_MIRRORED) << 38 |
+           (uint64_t)textured << 37 | (textured ? material : material - material % WINDOW);
 }
 
 struct sortable {
@@ -233,9 +236,9 @@ static void make_groups(struct scene *s)
         s->order[i] = sorted[i].instance;
         if (!i || sorted[i].key != sorted[i - 1].key) {
             const struct psc_material *m = material_of(s, sorted[i].instance);
-            uint32_t material = (uint32_t)sorted[i].key;
             s->groups[s->group_count++] = (struct scene_group){.first = i,
-                .material = material ? material - 1 : UINT32_MAX,
+                .material = (uint32_t)sorted[i].key,
+                .textured = sorted[i].key >> 37 & 1,
                 .double_sided = (m->flags & PSC_DOUBLE_SIDED) != 0,
                 .mirrored = (s->blob.instances[sorted[i].instance].flags & PSC_MIRRORED) != 0,
                 .closed = is_closed(s, sorted[i].instance),
@@ -427,7 +430,7 @@ bool scene_set_pose(struct scene *s, const struct pen_request *request, struct p
     return fits;
 }
 
-static void bind_material(struct scene *s, uint32_t material)
+static void bind_textures(struct scene *s, uint32_t material)
 {
     const struct psc_material *m = &s->blob.materials[material];
     for (int i = 0; i < SCENE_UNITS; i++) {
@@ -505,16 +508,19 @@ uint64_t scene_draw(struct scene *s, const struct cull_view *view, const struct 
             own, (GLsizeiptr)(picked.count * sizeof *picked.indices), picked.indices, 0);
         use_indices(s, own);
     }
-    gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, STORAGE_MATERIALS, s->materials);
     for (uint32_t g = 0; g < s->group_count; g++) {
         const struct scene_group *group = &s->groups[g];
         if (!runs[g].count)
             continue;
-        bool textured = group->alpha || (pass->full && group->material != UINT32_MAX);
+        bool textured = group->alpha || (pass->full && group->textured);
         gl.UseProgram(textured ? pass->textured : pass->opaque);
         gl.BindVertexArray(pass->full || textured ? s->full_array : s->depth_array);
+        if (pass->full || textured)
+            gl.BindBufferRange(GL_UNIFORM_BUFFER, UBO_MATERIALS, s->materials,
+                (GLintptr)(group->material * sizeof(struct material_record)),
+                sizeof(struct materials_block));
         if (textured)
-            bind_material(s, group->material);
+            bind_textures(s, group->material);
         if (runs[g].cull_back)
             gl.Enable(GL_CULL_FACE);
         else

@@ -16,7 +16,8 @@
 /* Draws that share state. What differs per draw (matrix, material) rides on instance attributes. */
 struct scene_group {
     uint32_t first, count; /* of scene->order */
-    uint32_t material;     /* whose textures are bound; UINT32_MAX: none needed */
+    uint32_t material;     /* first that is bound */
+    bool textured;         /* with its textures; it is the only one */
     bool double_sided, mirrored;
     bool closed; /* its surfaces are closed, face outwards and have no holes */
     bool alpha;  /* MASK or BLEND: fragments may be discarded */

@@ -12,7 +12,6 @@ in vec3 v_normal;
 in vec4 v_tangent;
 in vec4 v_uv;
 in vec4 v_color;
-flat in uint v_material;
 
 layout(location = 0) out vec4 out_normal; // geometric, shading
 // Square root of albedo; a: 1 a lit surface, 0 the ground. LAYER: alpha.
@@ -73,14 +72,14 @@ void main()
     out_emission = vec3(0.0);
 #endif
 #else
-    Material m = materials[v_material];
+    Material m = materials[OWN_MATERIAL];
     vec3 emission = m.emissive.rgb;
     float metallic = m.surface.x, roughness = m.surface.y, occlusion = 1.0;
     float specular = min(0.5 * max(m.specular.r, max(m.specular.g, m.specular.b)), 1.0);
     vec3 f0 = m.specular.rgb;
     float glossiness = m.specular.a, cover = 1.0;
 #ifdef TEXTURED
-    vec4 base = material_base(v_material, v_uv, v_color);
+    vec4 base = material_base(OWN_MATERIAL, v_uv, v_color);
 #ifdef SOLID
     float threshold = solid_alpha;
 #else
@@ -95,24 +94,24 @@ void main()
     threshold = last != 0 ? threshold : 0.0;
     cover = last != 0 ? 1.0 : base.a;
 #endif
-    if (alpha_is_cut(v_material, base.a, threshold))
+    if (alpha_is_cut(OWN_MATERIAL, base.a, threshold))
         discard;
-    if (material_has(v_material, SCENE_UNIT_SURFACE)) {
-        vec4 t = material_sample(surface_map, v_material, SCENE_UNIT_SURFACE, v_uv);
+    if (material_has(OWN_MATERIAL, SCENE_UNIT_SURFACE)) {
+        vec4 t = material_sample(surface_map, OWN_MATERIAL, SCENE_UNIT_SURFACE, v_uv);
         metallic *= t.b;
         roughness *= t.g;
         f0 *= t.rgb;
         glossiness *= t.a;
     }
-    if (material_has(v_material, SCENE_UNIT_OCCLUSION))
+    if (material_has(OWN_MATERIAL, SCENE_UNIT_OCCLUSION))
         occlusion =
             1.0 +
             m.surface.z *
-                (material_sample(occlusion_map, v_material, SCENE_UNIT_OCCLUSION, v_uv).r - 1.0);
-    if (material_has(v_material, SCENE_UNIT_EMISSION))
-        emission *= material_sample(emission_map, v_material, SCENE_UNIT_EMISSION, v_uv).rgb;
-    if (material_has(v_material, SCENE_UNIT_NORMAL) && dot(v_tangent.xyz, v_tangent.xyz) > 0.0) {
-        vec3 t = material_sample(normal_map, v_material, SCENE_UNIT_NORMAL, v_uv).xyz * 2.0 - 1.0;
+                (material_sample(occlusion_map, OWN_MATERIAL, SCENE_UNIT_OCCLUSION, v_uv).r - 1.0);
+    if (material_has(OWN_MATERIAL, SCENE_UNIT_EMISSION))
+        emission *= material_sample(emission_map, OWN_MATERIAL, SCENE_UNIT_EMISSION, v_uv).rgb;
+    if (material_has(OWN_MATERIAL, SCENE_UNIT_NORMAL) && dot(v_tangent.xyz, v_tangent.xyz) > 0.0) {
+        vec3 t = material_sample(normal_map, OWN_MATERIAL, SCENE_UNIT_NORMAL, v_uv).xyz * 2.0 - 1.0;
         t.xy *= m.surface.w;
         // From behind a surface bends the same way: all three vectors are turned round.
         vec3 tangent = normalize(v_tangent.xyz - shading * dot(v_tangent.xyz, shading));

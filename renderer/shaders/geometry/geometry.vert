@@ -12,7 +12,9 @@ layout(location = ATTRIBUTE_COLOR) in vec4 color;
 layout(location = ATTRIBUTE_MATERIAL) in float material;
 out vec4 v_uv;
 out vec4 v_color;
-flat out uint v_material;
+#ifndef ALPHA
+flat out uint v_material; // of those that are bound
+#endif
 #endif
 #ifdef FULL
 layout(location = ATTRIBUTE_NORMAL) in vec4 normal;
@@ -33,7 +35,7 @@ void main()
         view.ground.z - corner.y * view.ground.w);
     v_uv = vec4(0.0);
     v_color = vec4(1.0);
-    v_material = 0xffffffffu;
+    v_material = 0u;
     v_normal = vec3(0.0, 1.0, 0.0);
     v_tangent = vec4(0.0);
 #else
@@ -42,7 +44,9 @@ void main()
 #if defined(FULL) || defined(ALPHA)
     v_uv = uv;
     v_color = color;
+#ifndef ALPHA
     v_material = uint(material);
+#endif
 #endif
 #ifdef FULL
     // Normals go with the cofactor matrix, which also serves singular and mirroring matrices. Unit

@@ -1,6 +1,14 @@
 // Materials and their textures.
 #include "material.def"
 
+// What has textures or holes is drawn material by material, with the first that is bound.
+#if defined(TEXTURED) || defined(ALPHA)
+#define OWN_MATERIAL 0u
+#else
+flat in uint v_material;
+#define OWN_MATERIAL v_material
+#endif
+
 layout(binding = SCENE_UNIT_BASE) uniform sampler2D base_map;
 layout(binding = SCENE_UNIT_SURFACE) uniform sampler2D surface_map;
 layout(binding = SCENE_UNIT_NORMAL) uniform sampler2D normal_map;

@@ -6,7 +6,6 @@
 
 in vec4 v_uv;
 in vec4 v_color;
-flat in uint v_material;
 #endif
 
 #ifdef SOLID
@@ -18,14 +17,14 @@ flat in uint v_material;
 void main()
 {
 #ifdef ALPHA
-    Footprint f = material_footprint(v_material, SCENE_UNIT_BASE, v_uv);
-    bool textured = material_has(v_material, SCENE_UNIT_BASE);
-    float whole = materials[v_material].base_color.a * v_color.a;
+    Footprint f = material_footprint(OWN_MATERIAL, SCENE_UNIT_BASE, v_uv);
+    bool textured = material_has(OWN_MATERIAL, SCENE_UNIT_BASE);
+    float whole = materials[OWN_MATERIAL].base_color.a * v_color.a;
     int covered = 0;
     for (int i = 0; i < EDGE_PLACES; i++) {
         vec2 at = f.at + edge.across[i] * f.across + edge.down[i] * f.down;
         float alpha = textured ? whole * textureGrad(base_map, at, f.across, f.down).a : whole;
-        if (!alpha_is_cut(v_material, alpha, THRESHOLD))
+        if (!alpha_is_cut(OWN_MATERIAL, alpha, THRESHOLD))
             covered |= 1 << i;
     }
     gl_SampleMask[0] = covered;

@@ -6,7 +6,6 @@ layout(location = LOCATION_SEED)
     uniform uint seed; // of the hashed threshold: differs between maps that are averaged
 in vec4 v_uv;
 in vec4 v_color;
-flat in uint v_material;
 #endif
 
 #ifdef PEEL // only what lies behind the layer before
@@ -21,9 +20,9 @@ void main()
         discard;
 #endif
 #ifdef ALPHA
-    float alpha = material_base(v_material, v_uv, v_color).a;
+    float alpha = material_base(OWN_MATERIAL, v_uv, v_color).a;
     float threshold = pixel_threshold(gl_FragCoord.xyz, seed);
-    if (alpha_is_cut(v_material, alpha, threshold))
+    if (alpha_is_cut(OWN_MATERIAL, alpha, threshold))
         discard;
 #endif
 }

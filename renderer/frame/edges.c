@@ -8,6 +8,7 @@
 #include "renderer/passes/draw/turn.h"
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 _Static_assert(OPEN_TILE == 4, "edge_tiles.frag looks at so many");
 
@@ -125,7 +126,8 @@ bool frame_edges_blend(const struct frame_job *job, const struct view *view, boo
     /* Elsewhere than in software triangles cost less than to wait for what was drawn. */
     float *farthest = job->ctx->software ? read_tiles(job, tiles) : NULL;
     struct pick_tiles wanted = {tiles->width, tiles->height, (float)r->width / OPEN_TILE,
-        (float)r->height / OPEN_TILE, farthest};
+        (float)r->height / OPEN_TILE, .farthest = farthest};
+    memcpy(wanted.world_to_clip, view->world_to_clip, sizeof wanted.world_to_clip);
     const struct pick_tiles *only = farthest ? &wanted : NULL;
     for (uint32_t first = 0; ok && first < r->height; first += most) {
         uint32_t rows = r->height - first < most ? r->height - first : most;

@@ -23,8 +23,34 @@ struct cull_command {
     uint32_t count, instance_count, first_index, base_vertex, base_instance;
 };
 
-/* Appends the visible runs of one instance to commands[*count] (neighbouring meshlets are merged);
- * `commands` must have room for the instance's meshlet count. `cull_back`: meshlets that face away
- * are dropped. Returns the triangles appended. */
-uint64_t cull_instance(const struct cull_view *view, const struct psc_scene *blob,
-    uint32_t instance, bool cull_back, struct cull_command *commands, uint32_t *count);
+/* One piece of a drawing that is made in several. What it costs is counted in pixels that its triangles
+ * may cover and that are drawn one over the other, and never too low. */
+struct cull_piece {
+    double pixels; /* of what the view shows */
+    double most;   /* that it may cost; infinite: it is all */
+    double work;   /* what it does cost */
+    /* Where it begins, and then where the next one does: all 0 is the beginning. */
+    uint32_t group, instance, meshlet, index;
+    bool more; /* there is a next one */
+};
+
+/* What is to be drawn of a scene. */
+struct cull_list {
+    const struct psc_scene *blob;
+    float *areas; /* of each meshlet's triangles, object space, m2; below 0: not known yet */
+    struct cull_command *commands;
+    uint32_t count, room;
+    double weight; /* a pixel's work */
+};
+
+/* Work of a change of textures, for which a driver may have to compile, and of a pixel that looks at
+ * some, compared with one that only has a depth. */
+#define CULL_STATE_WORK (1u << 19)
+#define CULL_TEXTURED_WEIGHT 8
+
+/* Appends the visible runs of one instance, from the piece's meshlet and index on (neighbouring
+ * meshlets are merged), as long as it may cost more and there is room; at the instance's end both are
+ * 0 again, else there is more. `cull_back`: meshlets that face away are dropped. Returns the triangles
+ * appended. */
+uint64_t cull_instance(const struct cull_view *view, uint32_t instance, bool cull_back,
+    struct cull_list *list, struct cull_piece *piece);

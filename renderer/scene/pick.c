@@ -12,16 +12,16 @@ struct pick_corner {
     float x, y, w; /* tiles; clip space, 0: before the near plane, below 0: not known yet */
 };
 
-static struct pick_corner project(const struct pick_tiles *tiles, const mat4 world_to_clip,
-    const float world[12], const float at[3])
+static struct pick_corner project(
+    const struct pick_tiles *tiles, const float world[12], const float at[3])
 {
+    const vec4 *m = tiles->world_to_clip;
     float p[3], clip[4];
     for (int i = 0; i < 3; i++)
         p[i] = world[4 * i] * at[0] + world[4 * i + 1] * at[1] + world[4 * i + 2] * at[2] +
                world[4 * i + 3];
     for (int i = 0; i < 4; i++)
-        clip[i] = world_to_clip[0][i] * p[0] + world_to_clip[1][i] * p[1] +
-                  world_to_clip[2][i] * p[2] + world_to_clip[3][i];
+        clip[i] = m[0][i] * p[0] + m[1][i] * p[1] + m[2][i] * p[2] + m[3][i];
     return (struct pick_corner){(0.5f + 0.5f * clip[0] / clip[3]) * tiles->across,
         (0.5f - 0.5f * clip[1] / clip[3]) * tiles->down, clip[3] > clip[2] ? clip[3] : 0};
 }
@@ -50,9 +50,8 @@ static bool is_wanted(const struct pick_tiles *tiles, const struct pick_corner c
     return false;
 }
 
-void pick_triangles(const struct pick_tiles *tiles, const mat4 world_to_clip,
-    const struct psc_scene *blob, struct cull_command *commands, uint32_t first, uint32_t *count,
-    struct picked *picked)
+void pick_triangles(const struct pick_tiles *tiles, const struct psc_scene *blob,
+    struct cull_command *commands, uint32_t first, uint32_t *count, struct picked *picked)
 {
     if (first == *count)
         return;
@@ -74,11 +73,10 @@ void pick_triangles(const struct pick_tiles *tiles, const mat4 world_to_clip,
             for (int k = 0; k < 3; k++) {
                 uint32_t vertex = t[i + k] - primitive->first_vertex;
                 if (picked->corners[vertex].w < 0)
-                    picked->corners[vertex] =
-                        project(tiles, world_to_clip, world, positions[vertex]);
+                    picked->corners[vertex] = project(tiles, world, positions[vertex]);
                 corners[k] = picked->corners[vertex];
             }
-            if (!is_wanted(tiles, corners, world_to_clip[3][2]))
+            if (!is_wanted(tiles, corners, tiles->world_to_clip[3][2]))
                 continue;
             memcpy(picked->indices + picked->count, t + i, 3 * sizeof *t);
             picked->count += 3;

@@ -7,6 +7,7 @@
 
 /* Materials that are bound together. */
 #define WINDOW (sizeof(struct materials_block) / sizeof(struct material_record))
+#define MOST_COMMANDS (1u << 18) /* at once */
 
 /* Instance attribute: three matrix rows and the material, 64 bytes. */
 struct instance_record {
@@ -248,7 +249,17 @@ static void make_groups(struct scene *s)
         s->groups[s->group_count - 1].count++;
     }
     free(sorted);
-    s->command_room = pen_alloc(meshlets + 1, sizeof *s->command_room);
+    s->command_count = meshlets < MOST_COMMANDS ? (uint32_t)meshlets + 1 : MOST_COMMANDS;
+    s->command_room = pen_alloc(s->command_count, sizeof *s->command_room);
+}
+
+/* They are found where they are asked for. */
+static void forget_areas(struct scene *s)
+{
+    if (!s->meshlet_areas)
+        s->meshlet_areas = pen_alloc(s->blob.meshlet_count + (size_t)1, sizeof *s->meshlet_areas);
+    for (uint32_t i = 0; i < s->blob.meshlet_count; i++)
+        s->meshlet_areas[i] = -1;
 }
 
 static struct scene *upload(struct scene *s, struct pen_error *error)
@@ -265,6 +276,7 @@ static struct scene *upload(struct scene *s, struct pen_error *error)
     s->depth_array = make_array(s, false);
     s->full_array = make_array(s, true);
     make_groups(s);
+    forget_areas(s);
     find_kinds(s);
     gl.CreateBuffers(1, &s->commands);
     scene_measure(s);
@@ -364,6 +376,7 @@ void scene_destroy(struct scene *s)
     free(s->order);
     free(s->groups);
     free(s->command_room);
+    free(s->meshlet_areas);
     pose_destroy(s->poses);
     stage_finish(&s->rest_stage);
     stage_finish(&s->moving_stage);
@@ -390,7 +403,7 @@ static void follow_pose(struct scene *s, uint32_t changes)
 {
     s->blob = *pose_scene(s->poses);
     if (changes & POSE_VERTICES)
-        upload_moved(s);
+        upload_moved(s), forget_areas(s);
     if (changes & (POSE_INSTANCES | POSE_STATE | POSE_SURFACES))
         upload_instances(s);
     if (changes & (POSE_STATE | POSE_SURFACES))
@@ -468,51 +481,75 @@ static void use_indices(const struct scene *s, GLuint buffer)
     gl.VertexArrayElementBuffer(s->full_array, buffer);
 }
 
-uint64_t scene_draw(struct scene *s, const struct cull_view *view, const struct scene_pass *pass)
+static bool needs_textures(const struct scene_pass *pass, const struct scene_group *group)
 {
-    struct run {
-        uint32_t first, count;
-        bool cull_back;
-    };
-    uint32_t total = 0;
+    return group->alpha || (pass->full && group->textured);
+}
+
+/* The commands of one group within a piece of a drawing. */
+struct run {
+    uint32_t group, first, count;
+    bool cull_back;
+};
+
+/* Fills the piece: what is to be drawn of each group. Returns the triangles. */
+static uint64_t gather(struct scene *s, const struct cull_view *view, const struct scene_pass *pass,
+    struct cull_piece *piece, struct run *runs, uint32_t *run_count, struct picked *picked)
+{
+    struct cull_list list = {&s->blob, s->meshlet_areas, s->command_room, 0, s->command_count, 1};
     uint64_t triangles = 0;
+    piece->more = false;
+    for (; piece->group < s->group_count; piece->group++, piece->instance = 0) {
+        const struct scene_group *group = &s->groups[piece->group];
+        struct run *run = &runs[*run_count];
+        *run = (struct run){piece->group, list.count, 0, culls_back(s, group, view)};
+        list.weight = needs_textures(pass, group) ? CULL_TEXTURED_WEIGHT : 1;
+        if (pass->blended && !group->blend)
+            continue;
+        for (; piece->instance < group->count && !piece->more; piece->instance++) {
+            uint32_t instance = s->order[group->first + piece->instance];
+            uint32_t before = list.count;
+            if (!pass->hidden || !pass->hidden[instance])
+                triangles += cull_instance(view, instance, run->cull_back, &list, piece);
+            if (pass->tiles)
+                pick_triangles(pass->tiles, &s->blob, s->command_room, before, &list.count, picked);
+            if (piece->more)
+                break;
+        }
+        run->count = list.count - run->first;
+        *run_count += run->count > 0;
+        if (run->count && needs_textures(pass, group))
+            piece->work += CULL_STATE_WORK;
+        if (piece->more)
+            break;
+    }
+    return pass->tiles ? picked->count / 3 : triangles;
+}
+
+uint64_t scene_draw(struct scene *s, const struct cull_view *view, const struct scene_pass *pass,
+    struct cull_piece *piece)
+{
     struct picked picked = {0};
     GLuint own = 0;
+    uint32_t run_count = 0;
     struct run *runs = pen_alloc_zero(s->group_count + 1, sizeof *runs);
-    for (uint32_t g = 0; g < s->group_count; g++) {
-        runs[g].first = total;
-        runs[g].cull_back = culls_back(s, &s->groups[g], view);
-        if (pass->blended && !s->groups[g].blend)
-            continue;
-        for (uint32_t i = 0; i < s->groups[g].count; i++) {
-            uint32_t instance = s->order[s->groups[g].first + i];
-            uint32_t before = total;
-            if (!pass->hidden || !pass->hidden[instance])
-                triangles += cull_instance(
-                    view, &s->blob, instance, runs[g].cull_back, s->command_room, &total);
-            if (pass->tiles)
-                pick_triangles(pass->tiles, view->world_to_clip, &s->blob, s->command_room, before,
-                    &total, &picked);
-        }
-        runs[g].count = total - runs[g].first;
-    }
-    if (!total)
+    uint64_t triangles = gather(s, view, pass, piece, runs, &run_count, &picked);
+    if (!run_count)
         goto done;
-    gl.NamedBufferData(s->commands, (GLsizeiptr)(total * sizeof *s->command_room), s->command_room,
+    const struct run *last = &runs[run_count - 1];
+    gl.NamedBufferData(s->commands,
+        (GLsizeiptr)((last->first + last->count) * sizeof *s->command_room), s->command_room,
         GL_STREAM_DRAW);
     gl.BindBuffer(GL_DRAW_INDIRECT_BUFFER, s->commands);
     if (pass->tiles) {
-        triangles = picked.count / 3;
         gl.CreateBuffers(1, &own);
         gl.NamedBufferStorage(
             own, (GLsizeiptr)(picked.count * sizeof *picked.indices), picked.indices, 0);
         use_indices(s, own);
     }
-    for (uint32_t g = 0; g < s->group_count; g++) {
-        const struct scene_group *group = &s->groups[g];
-        if (!runs[g].count)
-            continue;
-        bool textured = group->alpha || (pass->full && group->textured);
+    for (const struct run *run = runs; run <= last; run++) {
+        const struct scene_group *group = &s->groups[run->group];
+        bool textured = needs_textures(pass, group);
         gl.UseProgram(textured ? pass->textured : pass->opaque);
         gl.BindVertexArray(pass->full || textured ? s->full_array : s->depth_array);
         if (pass->full || textured)
@@ -521,14 +558,14 @@ uint64_t scene_draw(struct scene *s, const struct cull_view *view, const struct 
                 sizeof(struct materials_block));
         if (textured)
             bind_textures(s, group->material);
-        if (runs[g].cull_back)
+        if (run->cull_back)
             gl.Enable(GL_CULL_FACE);
         else
             gl.Disable(GL_CULL_FACE);
         gl.FrontFace(group->mirrored != pass->front_is_clockwise ? GL_CW : GL_CCW);
         gl.MultiDrawElementsIndirect(GL_TRIANGLES, GL_UNSIGNED_INT,
-            (const void *)(uintptr_t)(runs[g].first * sizeof *s->command_room),
-            (GLsizei)runs[g].count, 0);
+            (const void *)(uintptr_t)(run->first * sizeof *s->command_room), (GLsizei)run->count,
+            0);
     }
     gl.Disable(GL_CULL_FACE);
     gl.FrontFace(GL_CCW);

@@ -54,6 +54,8 @@ struct scene {
     struct scene_group *groups;
     uint32_t group_count;
     struct cull_command *command_room;
+    uint32_t command_count;         /* of one piece of a drawing at most */
+    float *meshlet_areas;           /* see cull_list */
     float (*instance_bounds)[2][3]; /* world */
     struct scene_stage rest_stage, moving_stage;
     int32_t moving_animation;        /* that moving_stage is of; -1: none yet */
@@ -115,6 +117,8 @@ struct scene_pass {
     bool blended;                   /* BLEND materials alone */
     const struct pick_tiles *tiles; /* only triangles that may be seen there; NULL: all */
 };
-/* Returns the triangles drawn. The caller has bound framebuffer, viewport and depth state. */
-uint64_t scene_draw(
-    struct scene *scene, const struct cull_view *view, const struct scene_pass *pass);
+/* Draws one piece, and tells in it where the next one begins: what all pieces leave is what the whole
+ * drawn at once does. Returns the triangles drawn. The caller has bound framebuffer, viewport and depth
+ * state. */
+uint64_t scene_draw(struct scene *scene, const struct cull_view *view,
+    const struct scene_pass *pass, struct cull_piece *piece);

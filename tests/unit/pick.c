@@ -101,7 +101,7 @@ int main(void)
             .positions = (const float(*)[3])positions,
             .indices = indices};
         struct pick_tiles tiles = {
-            ACROSS, DOWN, (float)WIDTH / TILE, (float)HEIGHT / TILE, farthest};
+            ACROSS, DOWN, (float)WIDTH / TILE, (float)HEIGHT / TILE, .farthest = farthest};
         struct cull_command commands[] = {
             {3 * TRIANGLES / 2, 1, 0, 0, 0}, {3 * TRIANGLES / 2, 1, 3 * TRIANGLES / 2, 0, 0}};
         struct picked picked = {0};
@@ -109,7 +109,8 @@ int main(void)
         mat4 view;
         make_view(view);
         make_tiles(farthest);
-        pick_triangles(&tiles, view, &scene, commands, 0, &count, &picked);
+        memcpy(tiles.world_to_clip, view, sizeof view);
+        pick_triangles(&tiles, &scene, commands, 0, &count, &picked);
         CHECK(count == (picked.count > 0));
         CHECK(!count || (commands[0].count == picked.count && !commands[0].first_index));
         for (uint32_t i = 0; i < TRIANGLES; i++) {

@@ -45,13 +45,12 @@ static void set_matrix(GLuint program, const mat4 matrix)
 }
 
 /* ground: the program that draws it, or 0. */
-static uint64_t draw_band(struct technique_ctx *ctx, struct scene *scene, const struct view *view,
-    const struct scene_pass *pass, GLuint ground, const struct pass_bands *bands,
-    const struct gbuffer *g)
+static uint64_t draw_piece(struct technique_ctx *ctx, struct scene *scene, const struct view *view,
+    const struct scene_pass *pass, GLuint ground, struct pass_bands *bands, const struct gbuffer *g)
 {
     struct cull_view cull;
     view_to_cull(view, &cull);
-    pass_bands_crop(bands, 1, cull.world_to_clip);
+    pass_bands_crop(bands, 1, 0, view->height, cull.world_to_clip);
     set_matrix(pass->opaque, view->world_to_clip);
     set_matrix(pass->textured, view->world_to_clip);
     gl.BindFramebuffer(GL_FRAMEBUFFER, g->framebuffer);
@@ -61,8 +60,8 @@ static uint64_t draw_band(struct technique_ctx *ctx, struct scene *scene, const 
     gl.Enable(GL_DEPTH_TEST);
     gl.DepthFunc(GL_GREATER);
     pass_bands_aim(bands);
-    uint64_t triangles = scene_draw(scene, &cull, pass);
-    if (ground) {
+    uint64_t triangles = scene_draw(scene, &cull, pass, &bands->piece);
+    if (ground && !bands->piece.more) {
         set_matrix(ground, view->world_to_clip);
         gl.UseProgram(ground);
         gl.BindVertexArray(ctx->empty_array);
@@ -96,7 +95,7 @@ bool pass_gbuffer(struct technique_ctx *ctx, struct scene *scene, const struct v
             gl.BindTextureUnit(UNIT_SOLID, how->solid->name);
             gl.ProgramUniform1i(pass.textured, LOCATION_LAST, how->last);
         }
-        *triangles += draw_band(ctx, scene, view, &pass, how->ground ? flat : 0, &bands, g);
+        *triangles += draw_piece(ctx, scene, view, &pass, how->ground ? flat : 0, &bands, g);
         ok = pass_bands_next(ctx, &bands, &more, error);
     }
     gl_timer_end(&ctx->timer);

@@ -21,15 +21,14 @@ static void find_places(const struct gl_target *depths, struct edges_block *wher
     }
 }
 
-static void draw_band(struct technique_ctx *ctx, struct scene *scene, const struct view *view,
-    const struct scene_pass *pass, GLuint ground, uint32_t first, const struct pass_bands *bands,
+static void draw_piece(struct technique_ctx *ctx, struct scene *scene, const struct view *view,
+    const struct scene_pass *pass, GLuint ground, uint32_t first, struct pass_bands *bands,
     const struct gl_target *depths, GLuint block)
 {
     GLuint programs[] = {pass->opaque, pass->textured, ground};
     struct cull_view cull;
     view_to_cull(view, &cull);
-    if (bands->height == view->height)
-        pass_bands_crop(bands, 1, cull.world_to_clip);
+    pass_bands_crop(bands, 1, first, view->height, cull.world_to_clip);
     for (int i = 0; i < 3; i++)
         if (programs[i])
             gl.ProgramUniformMatrix4fv(
@@ -42,8 +41,8 @@ static void draw_band(struct technique_ctx *ctx, struct scene *scene, const stru
     gl.Enable(GL_DEPTH_TEST);
     gl.DepthFunc(GL_GREATER);
     pass_bands_aim(bands);
-    scene_draw(scene, &cull, pass);
-    if (ground) {
+    scene_draw(scene, &cull, pass, &bands->piece);
+    if (ground && !bands->piece.more) {
         gl.UseProgram(ground);
         gl.BindVertexArray(ctx->empty_array);
         gl.DrawArrays(GL_TRIANGLE_STRIP, 0, 4);
@@ -79,8 +78,8 @@ bool pass_places(struct technique_ctx *ctx, struct scene *scene, const struct vi
     bool more = true, ok = true;
     pass_bands_begin(ctx, &bands, view->width, rows, FIRST_PIXELS, 0);
     while (ok && more) {
-        draw_band(ctx, scene, view, &pass, which->ground && !pass.blended ? flat : 0, first, &bands,
-            depths, block);
+        draw_piece(ctx, scene, view, &pass, which->ground && !pass.blended ? flat : 0, first,
+            &bands, depths, block);
         ok = pass_bands_next(ctx, &bands, &more, error);
     }
     gl.DeleteBuffers(1, &block);

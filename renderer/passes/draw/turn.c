@@ -7,6 +7,11 @@
  * pixels. */
 #define BAND_ROWS 64
 #define LEAST_BAND_ROWS 16
+/* Work of the pieces of a drawing, see cull_piece: what takes a software rasteriser some hundred
+ * milliseconds at worst, what is not worth another wait, and what a GPU does without being watched. */
+#define FIRST_WORK (1u << 24)
+#define LEAST_WORK (1u << 20)
+#define WORK_ON_GPU (1ull << 35)
 
 /* Waits until what was handed over before the last call is done, so that no more than two pieces are
  * ever under way: elsewhere than on a CPU, time passes on the device. */
@@ -99,6 +104,13 @@ static struct technique_speed *speed_of(struct technique_ctx *ctx, uint32_t prog
     return speed;
 }
 
+static void begin_piece(struct pass_bands *bands)
+{
+    bands->piece.pixels = (double)bands->rows * bands->width;
+    bands->piece.work = 0;
+    bands->since_ms = gl_now_ms();
+}
+
 void pass_bands_begin(struct technique_ctx *ctx, struct pass_bands *bands, uint32_t width,
     uint32_t height, uint32_t first_pixels, uint32_t program)
 {
@@ -106,32 +118,49 @@ void pass_bands_begin(struct technique_ctx *ctx, struct pass_bands *bands, uint3
     double known = ctx->software && program ? speed_of(ctx, program)->ms_per_pixel : 0;
     if (known > 0)
         pixels = ctx->turns.most_ms / known;
-    *bands = (struct pass_bands){0, whole_rows(pixels / width, program), height, width, program, 0};
+    *bands = (struct pass_bands){.rows = whole_rows(pixels / width, program),
+        .height = height,
+        .width = width,
+        .program = program};
     if (is_whole(&ctx->turns) || bands->rows > height)
         bands->rows = height;
-    bands->since_ms = gl_now_ms();
+    bands->piece.most = is_whole(&ctx->turns) ? INFINITY
+                        : ctx->software       ? FIRST_WORK
+                                              : (double)WORK_ON_GPU;
+    begin_piece(bands);
 }
 
-/* The band is done: how long it took, and how many rows the next one should have. */
+/* What was drawn last is done: how long it took, and how much is to be drawn at once from here on. */
 static void learn(struct technique_ctx *ctx, struct pass_bands *bands)
 {
     gl.Finish();
-    double ms = fmax(gl_now_ms() - bands->since_ms, 1e-3);
+    double ms = fmax(gl_now_ms() - bands->since_ms, 1e-3), most_ms = ctx->turns.most_ms;
+    struct cull_piece *piece = &bands->piece;
     if (bands->program) {
         /* Of unlike amounts of work the most counts, and is forgotten slowly. */
         struct technique_speed *speed = speed_of(ctx, bands->program);
         double now = ms / ((double)bands->rows * bands->width);
         speed->ms_per_pixel = fmax(now, 0.7 * speed->ms_per_pixel);
     }
-    bands->rows =
-        whole_rows(fmin(bands->rows * ctx->turns.most_ms / ms, 8.0 * bands->rows), bands->program);
+    if (piece->work > 0)
+        piece->most = fmax(fmin(piece->work * most_ms / ms, 8 * piece->most), LEAST_WORK);
+    bool first = bands->slowest_ms == 0;
+    bands->slowest_ms = fmax(bands->slowest_ms, ms);
+    if (piece->more)
+        return;
+    /* Where there are several pieces, rows count only if one triangle is too much. */
+    double fit = most_ms / bands->slowest_ms;
+    if (first || fit < 0.5)
+        bands->rows = whole_rows(bands->rows * fmin(fit, 8), bands->program);
+    bands->slowest_ms = 0;
 }
 
-void pass_bands_crop(const struct pass_bands *bands, float top, mat4 to_clip)
+void pass_bands_crop(
+    const struct pass_bands *bands, float top, uint32_t first, uint32_t height, mat4 to_clip)
 {
     /* In units of clip space, from the top: the middle and half the height of the band. */
-    float half = (float)bands->rows / (float)bands->height;
-    float middle = (2 * (float)bands->y + (float)bands->rows) / (float)bands->height - 1;
+    float half = (float)bands->rows / (float)height;
+    float middle = (2 * (float)(first + bands->y) + (float)bands->rows) / (float)height - 1;
     for (int column = 0; column < 4; column++)
         to_clip[column][1] = (to_clip[column][1] + top * middle * to_clip[column][3]) / half;
 }
@@ -147,23 +176,26 @@ void pass_bands_aim(const struct pass_bands *bands)
 bool pass_bands_next(
     struct technique_ctx *ctx, struct pass_bands *bands, bool *more, struct pen_error *error)
 {
-    if (bands->rows == bands->height) {
-        if (ctx->software && bands->program && !is_whole(&ctx->turns))
-            learn(ctx, bands);
-        *more = false;
+    bool single = bands->rows == bands->height;
+    struct cull_piece *piece = &bands->piece;
+    *more = piece->more || bands->y + bands->rows < bands->height;
+    if (!single)
+        gl.Disable(GL_SCISSOR_TEST);
+    if (!*more && !(single && bands->program))
         return true;
-    }
-    gl.Disable(GL_SCISSOR_TEST);
-    bands->y += bands->rows;
-    *more = bands->y < bands->height;
+    uint32_t below = bands->y + bands->rows;
+    if (ctx->software && !is_whole(&ctx->turns))
+        learn(ctx, bands);
     if (!*more)
         return true;
-    if (ctx->software)
-        learn(ctx, bands);
-    uint32_t left = bands->height - bands->y;
-    bands->rows = bands->rows < left ? bands->rows : left;
+    if (!piece->more) {
+        uint32_t left = bands->height - below;
+        bands->y = below;
+        bands->rows = bands->rows < left ? bands->rows : left;
+        *piece = (struct cull_piece){.most = piece->most};
+    }
     if (!pass_turn(ctx, error))
         return false;
-    bands->since_ms = gl_now_ms();
+    begin_piece(bands);
     return true;
 }

@@ -24,8 +24,7 @@ struct drawing {
     struct scene_pass pass;
 };
 
-static void draw_band(
-    struct technique_run *run, const struct drawing *d, const struct pass_bands *bands)
+static void draw_piece(struct technique_run *run, const struct drawing *d, struct pass_bands *bands)
 {
     struct cull_view cull;
     light_face_cull(run->face, d->sample, d->rect, &cull);
@@ -39,7 +38,7 @@ static void draw_band(
     for (int i = 0; i < 2; i++)
         gl.ProgramUniformMatrix4fv(
             programs[i], LOCATION_TO_CLIP, 1, GL_FALSE, (const float *)cull.world_to_clip);
-    pass_bands_crop(bands, -1, cull.world_to_clip);
+    pass_bands_crop(bands, -1, 0, d->size, cull.world_to_clip);
     /* Maps that are averaged cut blended surfaces at different thresholds. */
     uint32_t seed;
     float mixed = d->sample[0] * 7919.0f + d->sample[1] * 104729.0f;
@@ -53,7 +52,7 @@ static void draw_band(
     gl.DepthFunc(GL_LESS);
     gl.Enable(GL_DEPTH_CLAMP); /* casters nearer than the near plane still cast */
     pass_bands_aim(bands);
-    scene_draw(run->scene, &cull, &d->pass);
+    scene_draw(run->scene, &cull, &d->pass, &bands->piece);
     gl.Disable(GL_DEPTH_CLAMP);
     gl.Disable(GL_DEPTH_TEST);
     gl.ClipControl(GL_UPPER_LEFT, GL_ZERO_TO_ONE);
@@ -83,7 +82,7 @@ static bool draw(
     bool more = true, ok = true;
     pass_bands_begin(run->ctx, &bands, d->size, d->size, FIRST_PIXELS, 0);
     while (ok && more) {
-        draw_band(run, d, &bands);
+        draw_piece(run, d, &bands);
         ok = pass_bands_next(run->ctx, &bands, &more, error);
     }
     free(hidden);

@@ -34,6 +34,7 @@ struct pen_renderer {
     struct scene *scenes[MAX_RESIDENT]; /* emission images too: scenes without geometry */
     uint32_t scene_count;
     struct emission_cache *emissions;
+    struct technique_speed speeds[TECHNIQUE_SPEEDS];
     const struct pen_blobs *admitting; /* not evicted now */
 };
 
@@ -53,6 +54,7 @@ struct pen_renderer *pen_renderer_create(
     r->ctx.is_called = config->is_called;
     r->ctx.call_context = config->call_context;
     r->ctx.programs = gl_programs_create(config->programs);
+    r->ctx.speeds = r->speeds;
     r->ctx.shadows = shadow_cache_create();
     r->ctx.histories = history_store_create(
         r->budget / 4, config->session_idle_ms > 0 ? config->session_idle_ms : SESSION_IDLE_MS);

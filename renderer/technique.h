@@ -37,9 +37,10 @@ struct technique_turns {
     GLsync fence; /* of the last piece but one */
 };
 
-/* What a software rasteriser takes for the pixels of a pass. */
+/* What a software rasteriser takes for the pixels of a kind of pass. */
+#define TECHNIQUE_SPEEDS 256
 struct technique_speed {
-    uint32_t program;
+    uint64_t kind;
     double ms_per_pixel; /* 0: not known */
 };
 
@@ -47,7 +48,7 @@ struct technique_speed {
  * that may be in progress side by side (renderer/lane.h), and they live as long as the context. */
 struct technique_ctx {
     struct technique_turns turns;
-    struct technique_speed speeds[64];
+    struct technique_speed *speeds;   /* TECHNIQUE_SPEEDS of them, shared */
     uint32_t lane;                    /* number of this one */
     bool (*is_called)(void *context); /* as pen_renderer_config has it */
     void *call_context;

@@ -11,6 +11,7 @@
 #include "renderer/light/meter.h"
 #include "renderer/passes/draw/gbuffer.h"
 #include "renderer/passes/draw/screen.h"
+#include "renderer/passes/draw/turn.h"
 #include "renderer/passes/filter/history.h"
 #include "renderer/passes/map/bound.h"
 #include "renderer/passes/map/shadow_cache.h"
@@ -46,10 +47,12 @@ struct frame {
     struct technique_watch watch;
 };
 
-static void fit_targets(struct frame *f)
+static bool fit_targets(struct frame *f, struct pen_error *error)
 {
     struct frame_targets *t = f->job->targets;
     const struct pen_request *r = f->job->request;
+    if (!frame_output_room(f->job, f->light_count, error))
+        return false;
     frame_output_fit(t, r);
     gl_target_fit(&t->vis, GL_RGBA16F, r->width, r->height, f->light_count ? f->light_count : 1, 1);
     if (frame_is_layered(f->job))
@@ -60,6 +63,7 @@ static void fit_targets(struct frame *f)
         frame_fit_sum(&t->beauty, GL_RGBA32F, r);
     if (frame_needs(r, PEN_SOURCE_VISIBILITY))
         frame_fit_sum(&t->visibility, GL_RGBA32F, r);
+    return pass_turn(f->job->ctx, error);
 }
 
 static bool resolve_emissions(struct frame *f, struct pen_error *error)
@@ -554,7 +558,8 @@ bool frame_render(const struct frame_job *job, struct pen_frame *frame, struct p
     job->ctx->shadow_budget = job->ctx->shadow_memory / (faces > 1 ? faces - 1 : 1);
     if (!resolve_emissions(&f, error))
         return false;
-    fit_targets(&f);
+    if (!fit_targets(&f, error))
+        return false;
     frame_layers_begin(job, result);
     f.watch = (struct technique_watch){on_step, on_show};
     frame_progress_begin(&f.progress, job, f.light_count, faces - 1);

@@ -4,6 +4,7 @@
 #include "protocol/memory.h"
 #include "renderer/frame/layers.h"
 #include "renderer/frame/needs.h"
+#include "renderer/passes/draw/pieces.h"
 #include "renderer/passes/draw/screen.h"
 #include <math.h>
 #include <stdio.h>
@@ -196,6 +197,14 @@ uint64_t frame_output_estimate(const struct pen_request *r, uint32_t lights, boo
     bytes += frame_needs(r, PEN_SOURCE_CLASSES) ? 4 : 0;
     bytes += frame_needs(r, PEN_SOURCE_VARIANCE) ? 4 : 0;
     return bytes * r->width * r->height;
+}
+
+bool frame_output_room(const struct frame_job *job, uint32_t lights, struct pen_error *error)
+{
+    const struct pen_request *r = job->request;
+    const struct gl_texture *last = &job->targets->vis.texture;
+    return (last->width == r->width && last->height == r->height) ||
+           pass_room(job->ctx, frame_output_estimate(r, lights, frame_is_layered(job)), error);
 }
 
 void frame_output_aim(const struct frame_job *job, const struct view *v, uint32_t number)

@@ -10,6 +10,9 @@ bool frame_output_is_direct(const struct frame_job *job);
  * a scene with blended surfaces. */
 uint64_t frame_output_estimate(const struct pen_request *request, uint32_t lights, bool blended);
 
+/* Sees to the memory of that, piece by piece; false as pass_turn. */
+bool frame_output_room(const struct frame_job *job, uint32_t lights, struct pen_error *error);
+
 /* Tells all passes of jittered frame `number` what it shows, and how it is displayed. */
 void frame_output_aim(const struct frame_job *job, const struct view *view, uint32_t number);
 

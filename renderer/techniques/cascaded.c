@@ -1,5 +1,7 @@
 #include "protocol/memory.h"
+#include "renderer/passes/draw/pieces.h"
 #include "renderer/passes/draw/screen.h"
+#include "renderer/passes/draw/turn.h"
 #include "renderer/passes/light/cascades.h"
 #include "renderer/passes/map/classify.h"
 #include "renderer/passes/light/sample_maps.h"
@@ -164,9 +166,13 @@ static const struct cascade *pending;
 static bool build_maps(struct technique_run *run, const struct shadow_key *key,
     struct shadow_input *input, struct pen_error *error)
 {
+    const struct cascade *c = pending;
+    if (!pass_room(run->ctx, (uint64_t)key->size * key->size * 4 * c->view_count, error))
+        return false;
     input->textures[0] =
-        gl_texture_create(GL_DEPTH_COMPONENT32F, key->size, key->size, pending->view_count, 1);
-    return pass_sample_views(run, pending->views, pending->view_count, &input->textures[0], error);
+        gl_texture_create(GL_DEPTH_COMPONENT32F, key->size, key->size, c->view_count, 1);
+    return pass_turn(run->ctx, error) &&
+           pass_sample_views(run, c->views, c->view_count, &input->textures[0], error);
 }
 
 static const struct shadow_input *cascade_maps(

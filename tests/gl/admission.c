@@ -58,7 +58,8 @@ static void begin(struct pen_renderer *r, struct progress *p, int blob)
     make_request(&p->request, blob);
     CHECK(admit(r, &p->request, blob, false, &error) == PEN_ADMITTED);
     p->render = pen_render_begin(r, &p->request, &p->frame, &p->result, &error);
-    CHECK(p->render && !pen_render_advance(p->render, 0));
+    /* Two pieces of work: the picture's buffers and the G-buffer. */
+    CHECK(p->render && !pen_render_advance(p->render, 0) && !pen_render_advance(p->render, 0));
 }
 
 static void end(struct progress *p)

@@ -3,7 +3,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#define FIRST_PIXELS (1u << 17)
+#define FIRST_PIXELS (1u << 15)
 
 static void fit(
     struct gbuffer *g, uint32_t width, uint32_t height, bool emission, enum gbuffer_kind kind)
@@ -88,7 +88,7 @@ bool pass_gbuffer(struct technique_ctx *ctx, struct scene *scene, const struct v
     gl.ClearNamedFramebufferfv(g->framebuffer, GL_DEPTH, 0, zero);
     struct pass_bands bands;
     bool more = true, ok = true;
-    pass_bands_begin(ctx, &bands, view->width, view->height, FIRST_PIXELS, 0);
+    pass_bands_begin(ctx, &bands, view->width, view->height, FIRST_PIXELS);
     while (ok && more) {
         if (how->kind == GBUFFER_LAYER) {
             gl.BindTextureUnit(UNIT_BEFORE, how->before->name);

@@ -1,10 +1,10 @@
 #include "renderer/passes/draw/screen.h"
+#include "protocol/fnv.h"
 #include "renderer/passes/draw/passes.h"
+#include "renderer/passes/draw/pieces.h"
 #include "renderer/passes/draw/tiles.h"
 #include "renderer/passes/draw/turn.h"
 #include <stdio.h>
-
-#define FIRST_PIXELS (1u << 14)
 
 static void bind_textures(
     struct technique_ctx *ctx, const struct pass_texture *textures, uint32_t count)
@@ -37,6 +37,7 @@ struct drawing {
     struct technique_ctx *ctx;
     GLuint program, framebuffer, extra;
     uint32_t width, height;
+    uint64_t kind; /* of pass_pieces */
     bool add, under, least, mute;
     const struct gl_texture *tiles; /* NULL: all pixels */
     int32_t tile_class, tile_px;
@@ -62,7 +63,24 @@ static void unbind(const struct drawing *d)
     unbind_samplers(d->textures, d->texture_count);
 }
 
-static void draw_piece(const struct drawing *d, const struct pass_bands *bands)
+/* Those of the piece. The scissors would not do: llvmpipe draws points a row too far at them. */
+static void draw_tiles(const struct drawing *d, const struct pass_pieces *piece)
+{
+    uint32_t width = d->tiles->width, height = d->tiles->height, px = (uint32_t)d->tile_px;
+    uint32_t x = piece->x / px, end_x = (piece->x + piece->columns + px - 1) / px;
+    uint32_t y = piece->y / px, end_y = (piece->y + piece->rows + px - 1) / px;
+    end_x = end_x < width ? end_x : width;
+    end_y = end_y < height ? end_y : height;
+    bool across = x == 0 && end_x == width;
+    /* Whole tiles: a point whose centre is outside the viewport would be lost. */
+    gl.Viewport(0, 0, (GLsizei)(width * px), (GLsizei)(height * px));
+    gl.Enable(GL_PROGRAM_POINT_SIZE);
+    for (uint32_t rows = across ? end_y - y : 1; y < end_y; y += rows)
+        gl.DrawArrays(GL_POINTS, (GLint)(y * width + x), (GLsizei)(rows * (end_x - x)));
+    gl.Disable(GL_PROGRAM_POINT_SIZE);
+}
+
+static void draw_piece(const struct drawing *d, const struct pass_pieces *piece)
 {
     gl.BindFramebuffer(GL_FRAMEBUFFER, d->framebuffer);
     gl.Viewport(0, 0, (GLsizei)d->width, (GLsizei)d->height);
@@ -83,15 +101,10 @@ static void draw_piece(const struct drawing *d, const struct pass_bands *bands)
     }
     if (d->mute)
         gl.ColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_FALSE);
-    pass_bands_aim(bands);
     if (d->tiles) {
-        GLsizei x = (GLsizei)d->tiles->width, y = (GLsizei)d->tiles->height;
-        /* Whole tiles: a point whose centre is outside the viewport would be lost. */
-        gl.Viewport(0, 0, x * d->tile_px, y * d->tile_px);
-        gl.Enable(GL_PROGRAM_POINT_SIZE);
-        gl.DrawArrays(GL_POINTS, 0, x * y);
-        gl.Disable(GL_PROGRAM_POINT_SIZE);
+        draw_tiles(d, piece);
     } else {
+        pass_pieces_aim(piece);
         gl.DrawArrays(GL_TRIANGLES, 0, 3);
     }
     gl.Disable(GL_BLEND);
@@ -101,23 +114,29 @@ static void draw_piece(const struct drawing *d, const struct pass_bands *bands)
 
 static bool draw(const struct drawing *d, struct pen_error *error)
 {
-    struct pass_bands bands;
+    struct pass_pieces pieces;
     uint32_t turn = d->ctx->turns.number;
     bool more = true, ok = true;
     if (d->tiles)
         gl.ProgramUniform2i(d->program, LOCATION_TILE, d->tile_px, d->tile_class);
     bind(d);
-    pass_bands_begin(d->ctx, &bands, d->width, d->height, FIRST_PIXELS,
-        d->tiles ? 0 : d->program); /* how much tiles cost does not follow from their pixels */
+    pass_pieces_begin(d->ctx, &pieces, d->width, d->height, d->kind);
     while (ok && more) {
         if (turn != d->ctx->turns.number)
             bind(d);
         turn = d->ctx->turns.number;
-        draw_piece(d, &bands);
-        ok = pass_bands_next(d->ctx, &bands, &more, error);
+        draw_piece(d, &pieces);
+        ok = pass_pieces_next(d->ctx, &pieces, &more, error);
     }
     unbind(d);
     return ok;
+}
+
+/* Equal programs with equal parameters. */
+static uint64_t kind_of(GLuint program, const struct pen_technique_info *info, const void *params)
+{
+    uint64_t hash = pen_fnv(PEN_FNV_START, &program, sizeof program);
+    return info && params ? pen_fnv(hash, params, info->struct_size) : hash;
 }
 
 bool pass_draw_tiles(struct technique_ctx *ctx, GLuint program, GLuint framebuffer,
@@ -132,6 +151,7 @@ bool pass_draw_tiles(struct technique_ctx *ctx, GLuint program, GLuint framebuff
                     .tile_px = CLASSIFY_TILE,
                     .width = width,
                     .height = height,
+                    .kind = kind_of(program, NULL, NULL),
                     .add = add},
         error);
 }
@@ -169,6 +189,8 @@ bool pass_screen(struct technique_run *run, const struct pass_screen *pass, stru
         .texture_count = pass->texture_count};
     if (!d.program)
         return false;
+    d.kind = kind_of(d.program, &run->technique->info, run->params);
+    d.kind = pen_fnv(d.kind, run->face->extent, sizeof run->face->extent);
     gl_timer_begin(&ctx->timer, PEN_STAGE_TECHNIQUE, pass->name);
     add_own(&d, UNIT_DEPTH, run->gbuffer->depth.texture.name, GL_SAMPLE_NEAREST);
     add_own(&d, UNIT_NORMAL, run->gbuffer->normal.texture.name, GL_SAMPLE_NEAREST);
@@ -204,6 +226,7 @@ bool pass_fill(struct technique_ctx *ctx, const struct pass_fill *pass, struct p
         .texture_count = pass->texture_count};
     if (!d.program)
         return false;
+    d.kind = kind_of(d.program, pass->info, pass->params);
     gl_timer_begin(&ctx->timer, pass->stage, pass->name);
     d.extra = make_extra(pass->extra, pass->extra_bytes);
     bool ok = draw(&d, error);

@@ -3,10 +3,7 @@
 #include <math.h>
 
 #define BAND_PIXELS_ON_GPU (1u << 24)
-/* Of a software rasteriser's tiles; where these take too long, a part of one, in whole blocks of 4 x 4
- * pixels. */
-#define BAND_ROWS 64
-#define LEAST_BAND_ROWS 16
+#define BAND_ROWS 64 /* of a software rasteriser's tiles */
 /* Work of the pieces of a drawing, see cull_piece: what takes a software rasteriser some hundred
  * milliseconds at worst, what is not worth another wait, and what a GPU does without being watched. */
 #define FIRST_WORK (1u << 24)
@@ -34,9 +31,9 @@ void pass_bind_counts(struct technique_ctx *ctx, GLuint buffer)
         gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, STORAGE_COUNTS, buffer);
 }
 
-/* Nobody comes in between. */
-static bool is_whole(const struct technique_turns *turns)
+bool pass_turn_is_whole(const struct technique_ctx *ctx)
 {
+    const struct technique_turns *turns = &ctx->turns;
     return !turns->fiber || turns->held || isinf(turns->most_ms);
 }
 
@@ -59,7 +56,7 @@ bool pass_turn(struct technique_ctx *ctx, struct pen_error *error)
     turns->stopped |= !turns->held && is_time_up(turns);
     if (turns->stopped)
         return pen_fail(error, PEN_DEADLINE, "/deadline_ms", "The image's time is up.");
-    if (is_whole(turns))
+    if (pass_turn_is_whole(ctx))
         return true;
     follow_device(ctx);
     double now = gl_now_ms();
@@ -81,27 +78,14 @@ bool pass_turn(struct technique_ctx *ctx, struct pen_error *error)
 
 bool pass_turn_inside(struct technique_ctx *ctx, struct pen_error *error)
 {
-    if (!is_whole(&ctx->turns) && ctx->software)
+    if (!pass_turn_is_whole(ctx) && ctx->software)
         gl.Finish();
     return pass_turn(ctx, error);
 }
 
-static uint32_t whole_rows(double rows, uint32_t program)
+static uint32_t whole_rows(double rows)
 {
-    uint32_t least = program ? LEAST_BAND_ROWS : BAND_ROWS;
-    double most = fmin(fmax(rows, least), 1 << 20);
-    uint32_t step = most >= BAND_ROWS ? BAND_ROWS : least;
-    return (uint32_t)most / step * step;
-}
-
-/* What is known of a program; of one that is not known yet 0, in place of another. */
-static struct technique_speed *speed_of(struct technique_ctx *ctx, uint32_t program)
-{
-    struct technique_speed *speed =
-        &ctx->speeds[program % (sizeof ctx->speeds / sizeof *ctx->speeds)];
-    if (speed->program != program)
-        *speed = (struct technique_speed){.program = program};
-    return speed;
+    return (uint32_t)fmin(fmax(rows, BAND_ROWS), 1 << 20) / BAND_ROWS * BAND_ROWS;
 }
 
 static void begin_piece(struct pass_bands *bands)
@@ -112,21 +96,16 @@ static void begin_piece(struct pass_bands *bands)
 }
 
 void pass_bands_begin(struct technique_ctx *ctx, struct pass_bands *bands, uint32_t width,
-    uint32_t height, uint32_t first_pixels, uint32_t program)
+    uint32_t height, uint32_t first_pixels)
 {
-    double pixels = ctx->software ? first_pixels : BAND_PIXELS_ON_GPU;
-    double known = ctx->software && program ? speed_of(ctx, program)->ms_per_pixel : 0;
-    if (known > 0)
-        pixels = ctx->turns.most_ms / known;
-    *bands = (struct pass_bands){.rows = whole_rows(pixels / width, program),
-        .height = height,
-        .width = width,
-        .program = program};
-    if (is_whole(&ctx->turns) || bands->rows > height)
+    uint32_t pixels = ctx->software ? first_pixels : BAND_PIXELS_ON_GPU;
+    *bands = (struct pass_bands){
+        .rows = whole_rows((double)pixels / width), .height = height, .width = width};
+    if (pass_turn_is_whole(ctx) || bands->rows > height)
         bands->rows = height;
-    bands->piece.most = is_whole(&ctx->turns) ? INFINITY
-                        : ctx->software       ? FIRST_WORK
-                                              : (double)WORK_ON_GPU;
+    bands->piece.most = pass_turn_is_whole(ctx) ? INFINITY
+                        : ctx->software         ? FIRST_WORK
+                                                : (double)WORK_ON_GPU;
     begin_piece(bands);
 }
 
@@ -136,12 +115,6 @@ static void learn(struct technique_ctx *ctx, struct pass_bands *bands)
     gl.Finish();
     double ms = fmax(gl_now_ms() - bands->since_ms, 1e-3), most_ms = ctx->turns.most_ms;
     struct cull_piece *piece = &bands->piece;
-    if (bands->program) {
-        /* Of unlike amounts of work the most counts, and is forgotten slowly. */
-        struct technique_speed *speed = speed_of(ctx, bands->program);
-        double now = ms / ((double)bands->rows * bands->width);
-        speed->ms_per_pixel = fmax(now, 0.7 * speed->ms_per_pixel);
-    }
     if (piece->work > 0)
         piece->most = fmax(fmin(piece->work * most_ms / ms, 8 * piece->most), LEAST_WORK);
     bool first = bands->slowest_ms == 0;
@@ -151,7 +124,7 @@ static void learn(struct technique_ctx *ctx, struct pass_bands *bands)
     /* Where there are several pieces, rows count only if one triangle is too much. */
     double fit = most_ms / bands->slowest_ms;
     if (first || fit < 0.5)
-        bands->rows = whole_rows(bands->rows * fmin(fit, 8), bands->program);
+        bands->rows = whole_rows(bands->rows * fmin(fit, 2));
     bands->slowest_ms = 0;
 }
 
@@ -176,18 +149,15 @@ void pass_bands_aim(const struct pass_bands *bands)
 bool pass_bands_next(
     struct technique_ctx *ctx, struct pass_bands *bands, bool *more, struct pen_error *error)
 {
-    bool single = bands->rows == bands->height;
     struct cull_piece *piece = &bands->piece;
-    *more = piece->more || bands->y + bands->rows < bands->height;
-    if (!single)
-        gl.Disable(GL_SCISSOR_TEST);
-    if (!*more && !(single && bands->program))
-        return true;
     uint32_t below = bands->y + bands->rows;
-    if (ctx->software && !is_whole(&ctx->turns))
-        learn(ctx, bands);
+    *more = piece->more || below < bands->height;
+    if (bands->rows != bands->height)
+        gl.Disable(GL_SCISSOR_TEST);
     if (!*more)
         return true;
+    if (ctx->software && !pass_turn_is_whole(ctx))
+        learn(ctx, bands);
     if (!piece->more) {
         uint32_t left = bands->height - below;
         bands->y = below;

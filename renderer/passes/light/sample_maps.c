@@ -1,6 +1,7 @@
 #include "renderer/passes/light/sample_maps.h"
 #include "protocol/fnv.h"
 #include "renderer/passes/draw/passes.h"
+#include "renderer/passes/draw/pieces.h"
 #include "renderer/passes/draw/turn.h"
 #include "renderer/passes/map/depth_map.h"
 #include "renderer/passes/map/shadow_cache.h"
@@ -123,27 +124,34 @@ static bool draw_layers(struct technique_run *run, const struct sample_point *po
     return pass_sample_views(run, views, n, array, error);
 }
 
-/* The builder of a kept input only gets the run: what it builds is handed over here. One GL thread
- * per process, so a static is no shared state. */
-static struct {
+/* The builder of a kept input only gets the run: what it builds is handed over here, and taken before
+ * another frame may come in between. One GL thread per process, so a static is no shared state. */
+static struct pending {
     const struct sample_point *points;
     uint32_t count;
 } pending;
 
+static uint64_t map_bytes(uint32_t size, uint32_t count)
+{
+    return (uint64_t)size * size * 4 * count;
+}
+
 static bool allocate(struct technique_run *run, const struct shadow_key *key,
     struct shadow_input *input, struct pen_error *error)
 {
-    (void)run, (void)error;
-    input->textures[0] =
-        gl_texture_create(GL_DEPTH_COMPONENT32F, key->size, key->size, pending.count, 1);
+    uint32_t count = pending.count;
+    if (!pass_room(run->ctx, map_bytes(key->size, count), error))
+        return false;
+    input->textures[0] = gl_texture_create(GL_DEPTH_COMPONENT32F, key->size, key->size, count, 1);
     return true;
 }
 
 static bool build(struct technique_run *run, const struct shadow_key *key,
     struct shadow_input *input, struct pen_error *error)
 {
-    return allocate(run, key, input, error) &&
-           draw_layers(run, pending.points, pending.count, ~0u, &input->textures[0], error);
+    struct pending own = pending;
+    return allocate(run, key, input, error) && pass_turn(run->ctx, error) &&
+           draw_layers(run, own.points, own.count, ~0u, &input->textures[0], error);
 }
 
 static const struct shadow_input *get(struct technique_run *run, const char *kind,
@@ -178,7 +186,11 @@ bool pass_sample_maps(struct technique_run *run, const struct sample_point *poin
     }
     static const struct pass_targets scratch = {1};
     struct gl_target *array = pass_targets(run->ctx, &scratch);
-    gl_target_fit(array, GL_DEPTH_COMPONENT32F, size, size, SAMPLE_MAP_BATCH, 1);
+    if ((array->texture.width != size &&
+            !pass_room(run->ctx, map_bytes(size, SAMPLE_MAP_BATCH), error)) ||
+        (gl_target_fit(array, GL_DEPTH_COMPONENT32F, size, size, SAMPLE_MAP_BATCH, 1) &&
+            !pass_turn(run->ctx, error)))
+        return false;
     *maps = &array->texture;
     return draw_layers(run, points, count, ~0u, *maps, error);
 }

@@ -37,11 +37,11 @@ struct technique_turns {
     GLsync fence; /* of the last piece but one */
 };
 
-/* What a software rasteriser takes for the pixels of a kind of pass. */
+/* What a software rasteriser takes for a kind of work. */
 #define TECHNIQUE_SPEEDS 256
 struct technique_speed {
     uint64_t kind;
-    double ms_per_pixel; /* 0: not known */
+    double ms; /* per unit, a pixel or what cull_piece counts; 0: not known */
 };
 
 /* What a frame in progress has for itself, and what all of them share. There are as many as frames

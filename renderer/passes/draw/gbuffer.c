@@ -88,7 +88,7 @@ bool pass_gbuffer(struct technique_ctx *ctx, struct scene *scene, const struct v
     gl.ClearNamedFramebufferfv(g->framebuffer, GL_DEPTH, 0, zero);
     struct pass_bands bands;
     bool more = true, ok = true;
-    pass_bands_begin(ctx, &bands, view->width, view->height, FIRST_PIXELS);
+    pass_bands_begin(ctx, &bands, view->width, view->height, FIRST_PIXELS, pass.opaque);
     while (ok && more) {
         if (how->kind == GBUFFER_LAYER) {
             gl.BindTextureUnit(UNIT_BEFORE, how->before->name);

@@ -15,14 +15,6 @@
 #define ROOM_STEP (4u << 20)
 #define PAGE_BYTES 4096
 
-static struct technique_speed *speed_of(struct technique_ctx *ctx, uint64_t kind)
-{
-    struct technique_speed *speed = &ctx->speeds[kind % TECHNIQUE_SPEEDS];
-    if (speed->kind != kind)
-        *speed = (struct technique_speed){.kind = kind};
-    return speed;
-}
-
 static bool is_whole(const struct pass_pieces *p)
 {
     return p->columns == p->width && p->rows == p->height;
@@ -60,7 +52,7 @@ void pass_pieces_begin(struct technique_ctx *ctx, struct pass_pieces *pieces, ui
     pieces->since_ms = gl_now_ms();
     if (pass_turn_is_whole(ctx))
         return;
-    double known = ctx->software ? speed_of(ctx, kind)->ms_per_pixel : 0;
+    double known = ctx->software ? pass_speed(ctx, kind)->ms : 0;
     cut(pieces, !ctx->software ? PIXELS_ON_GPU
                 : known > 0    ? ctx->turns.most_ms / known
                                : FIRST_PIXELS);
@@ -82,9 +74,9 @@ static double learn(struct technique_ctx *ctx, const struct pass_pieces *p)
         return PIXELS_ON_GPU;
     gl.Finish();
     double ms = fmax(gl_now_ms() - p->since_ms, 1e-3);
-    struct technique_speed *speed = speed_of(ctx, p->kind);
-    speed->ms_per_pixel = fmax(ms / pixels, REMEMBERED * speed->ms_per_pixel);
-    return fmin(ctx->turns.most_ms / speed->ms_per_pixel, MOST_GROWTH * pixels);
+    struct technique_speed *speed = pass_speed(ctx, p->kind);
+    speed->ms = fmax(ms / pixels, REMEMBERED * speed->ms);
+    return fmin(ctx->turns.most_ms / speed->ms, MOST_GROWTH * pixels);
 }
 
 bool pass_pieces_next(

@@ -76,7 +76,7 @@ bool pass_places(struct technique_ctx *ctx, struct scene *scene, const struct vi
     gl.ClearNamedFramebufferfv(depths->framebuffer, GL_DEPTH, 0, zero);
     struct pass_bands bands;
     bool more = true, ok = true;
-    pass_bands_begin(ctx, &bands, view->width, rows, FIRST_PIXELS);
+    pass_bands_begin(ctx, &bands, view->width, rows, FIRST_PIXELS, pass.opaque);
     while (ok && more) {
         draw_piece(ctx, scene, view, &pass, which->ground && !pass.blended ? flat : 0, first,
             &bands, depths, block);

@@ -4,11 +4,13 @@
 
 #define BAND_PIXELS_ON_GPU (1u << 24)
 #define BAND_ROWS 64 /* of a software rasteriser's tiles */
-/* Work of the pieces of a drawing, see cull_piece: what takes a software rasteriser some hundred
- * milliseconds at worst, what is not worth another wait, and what a GPU does without being watched. */
-#define FIRST_WORK (1u << 24)
+/* Work of the pieces of a drawing, see cull_piece: as long as its speed is not known, what is not worth
+ * another wait, and what a GPU does without being watched. */
+#define FIRST_WORK (1u << 22)
 #define LEAST_WORK (1u << 20)
 #define WORK_ON_GPU (1ull << 35)
+/* Of unlike pieces the slowest counts, and is forgotten slowly. */
+#define REMEMBERED 0.9
 
 /* Waits until what was handed over before the last call is done, so that no more than two pieces are
  * ever under way: elsewhere than on a CPU, time passes on the device. */
@@ -88,6 +90,14 @@ static uint32_t whole_rows(double rows)
     return (uint32_t)fmin(fmax(rows, BAND_ROWS), 1 << 20) / BAND_ROWS * BAND_ROWS;
 }
 
+struct technique_speed *pass_speed(struct technique_ctx *ctx, uint64_t kind)
+{
+    struct technique_speed *speed = &ctx->speeds[kind % TECHNIQUE_SPEEDS];
+    if (speed->kind != kind)
+        *speed = (struct technique_speed){.kind = kind};
+    return speed;
+}
+
 static void begin_piece(struct pass_bands *bands)
 {
     bands->piece.pixels = (double)bands->rows * bands->width;
@@ -96,16 +106,18 @@ static void begin_piece(struct pass_bands *bands)
 }
 
 void pass_bands_begin(struct technique_ctx *ctx, struct pass_bands *bands, uint32_t width,
-    uint32_t height, uint32_t first_pixels)
+    uint32_t height, uint32_t first_pixels, uint64_t kind)
 {
     uint32_t pixels = ctx->software ? first_pixels : BAND_PIXELS_ON_GPU;
     *bands = (struct pass_bands){
-        .rows = whole_rows((double)pixels / width), .height = height, .width = width};
+        .rows = whole_rows((double)pixels / width), .height = height, .width = width, .kind = kind};
+    double known = ctx->software ? pass_speed(ctx, kind)->ms : 0;
     if (pass_turn_is_whole(ctx) || bands->rows > height)
         bands->rows = height;
     bands->piece.most = pass_turn_is_whole(ctx) ? INFINITY
-                        : ctx->software         ? FIRST_WORK
-                                                : (double)WORK_ON_GPU;
+                        : !ctx->software        ? (double)WORK_ON_GPU
+                        : known > 0             ? fmax(ctx->turns.most_ms / known, LEAST_WORK)
+                                                : FIRST_WORK;
     begin_piece(bands);
 }
 
@@ -115,8 +127,11 @@ static void learn(struct technique_ctx *ctx, struct pass_bands *bands)
     gl.Finish();
     double ms = fmax(gl_now_ms() - bands->since_ms, 1e-3), most_ms = ctx->turns.most_ms;
     struct cull_piece *piece = &bands->piece;
-    if (piece->work > 0)
-        piece->most = fmax(fmin(piece->work * most_ms / ms, 8 * piece->most), LEAST_WORK);
+    if (piece->work > LEAST_WORK) { /* what is less tells little */
+        struct technique_speed *speed = pass_speed(ctx, bands->kind);
+        speed->ms = fmax(ms / piece->work, REMEMBERED * speed->ms);
+        piece->most = fmax(fmin(most_ms / speed->ms, 4 * piece->most), LEAST_WORK);
+    }
     bool first = bands->slowest_ms == 0;
     bands->slowest_ms = fmax(bands->slowest_ms, ms);
     if (piece->more)

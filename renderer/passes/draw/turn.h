@@ -14,18 +14,23 @@ bool pass_turn_is_whole(const struct technique_ctx *ctx);
 /* Binds a method's counters, for all of its passes. */
 void pass_bind_counts(struct technique_ctx *ctx, GLuint buffer);
 
+/* What was measured of a kind of work; of one that is not known yet 0, in place of another. */
+struct technique_speed *pass_speed(struct technique_ctx *ctx, uint64_t kind);
+
 /* A large drawing of triangles is cut into bands of rows, and what triangles there are in one into pieces, each as
  * long as a turn should last. */
 struct pass_bands {
     uint32_t y, rows, height, width; /* px; the band at hand: y to y + rows */
+    uint64_t kind;
     double since_ms;
     /* Of a drawing of triangles (scene_draw), that of the band which is at hand. */
     struct cull_piece piece;
     double slowest_ms; /* of the band's pieces so far */
 };
-/* first_pixels: of the first band, as long as the drawing's speed is not known. */
+/* first_pixels: of the first band; what there is to a pixel is only known then. kind: of drawings whose
+ * triangles take equally long. */
 void pass_bands_begin(struct technique_ctx *ctx, struct pass_bands *bands, uint32_t width,
-    uint32_t height, uint32_t first_pixels);
+    uint32_t height, uint32_t first_pixels, uint64_t kind);
 /* What outside the band need not be drawn: narrows a matrix to clip space, in which row 0 of `height` is
  * at y = `top` (-1 or 1); the drawing begins in row `first`. */
 void pass_bands_crop(

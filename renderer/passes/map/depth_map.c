@@ -80,7 +80,7 @@ static bool draw(
     gl.ClearNamedFramebufferfv(d->framebuffer, GL_DEPTH, 0, one);
     struct pass_bands bands;
     bool more = true, ok = true;
-    pass_bands_begin(run->ctx, &bands, d->size, d->size, FIRST_PIXELS);
+    pass_bands_begin(run->ctx, &bands, d->size, d->size, FIRST_PIXELS, d->pass.opaque);
     while (ok && more) {
         draw_piece(run, d, &bands);
         ok = pass_bands_next(run->ctx, &bands, &more, error);

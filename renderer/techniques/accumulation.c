@@ -78,7 +78,7 @@ const struct technique technique_accumulation = {
                     "Eurographics 2006 short papers",
         .artefacts = "Light leaks between texels at different depths; casters behind one another "
                      "are not seen with one layer; mode paper over- and undershoots where texels "
-                     "are large against the light.",
+                     "are large against the light." BLENDED_GRAIN,
         .cost_class = PEN_COST_HEAVY,
         .textured = false,
         .struct_size = sizeof(struct accumulation),

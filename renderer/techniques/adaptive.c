@@ -136,7 +136,7 @@ const struct technique technique_adaptive = {
                     "shapes and colors, IEICE Trans. Inf. & Syst., 2016, "
                     "doi:10.1587/transinf.2016EDL8102",
         .artefacts = "One average blocker depth for all cells; patterns finer than a sixteenth of "
-                     "the light are averaged.",
+                     "the light are averaged." BLENDED_GRAIN,
         .cost_class = PEN_COST_MEDIUM,
         .textured = true,
         .struct_size = sizeof(struct adaptive),

@@ -427,8 +427,9 @@ const struct technique technique_adaptive_sampling = {
                    "disagree for visible pixels, up to 289 samples with a shadow map each.",
         .citation = "M. Schwaerzler, O. Mattausch, D. Scherzer, M. Wimmer, Fast accurate soft "
                     "shadows with adaptive light source sampling, VMV 2012",
-        .artefacts = "A caster can hide between samples that agree; few samples show as bands; the "
-                     "sample set, and with it the penumbra, can change as the camera moves.",
+        .artefacts =
+            "A caster can hide between samples that agree; few samples show as bands; the "
+            "sample set, and with it the penumbra, can change as the camera moves." BLENDED_GRAIN,
         .cost_class = PEN_COST_HEAVY,
         .textured = true,
         .struct_size = sizeof(struct adaptive_sampling),

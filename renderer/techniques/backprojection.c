@@ -52,7 +52,7 @@ const struct technique technique_backprojection = {
         .artefacts =
             "Casters that overlap as seen from the receiver are subtracted twice, which is "
             "too dark; gaps wider than the threshold leak; one layer sees only what the "
-            "light's centre sees.",
+            "light's centre sees." BLENDED_GRAIN,
         .cost_class = PEN_COST_HEAVY,
         .textured = true,
         .candidates = PEN_CANDIDATES(""),

@@ -40,7 +40,7 @@ const struct technique technique_bilateral = {
         .citation = "H. Ali, H. Kolivand, M. Sunar, Soft bilateral filtering shadows using "
                     "multiple image-based algorithms, Multimedia Tools and Applications, 2017",
         .artefacts = "Bands where the filter is narrower than the steps between samples; soft ends "
-                     "of the penumbra where it is wider.",
+                     "of the penumbra where it is wider." BLENDED_GRAIN,
         .cost_class = PEN_COST_HEAVY,
         .textured = true,
         .candidates = PEN_CANDIDATES(""),

@@ -104,7 +104,7 @@ const struct technique technique_bitmask = {
             "M. Schwarz, M. Stamminger, Bitmask soft shadows, Computer Graphics Forum 26(3) "
             "(Eurographics), 2007",
         .artefacts = "As many grey levels as points; gaps between texels of steep casters leak; "
-                     "with one layer, only what the light's centre sees casts.",
+                     "with one layer, only what the light's centre sees casts." BLENDED_GRAIN,
         .cost_class = PEN_COST_HEAVY,
         .textured = true,
         .struct_size = sizeof(struct bitmask),

@@ -304,7 +304,7 @@ const struct technique technique_cascaded = {
         .citation = "Cascaded soft shadow maps, IIETA 2023; F. Zhang, H. Sun, L. Xu, L. Lun, "
                     "Parallel-split shadow maps for large-scale virtual environments, VRCIA 2006",
         .artefacts = "Far cascades have four samples and coarse maps: bands and blocky edges; maps "
-                     "are drawn again when the camera moves.",
+                     "are drawn again when the camera moves." BLENDED_GRAIN,
         .cost_class = PEN_COST_HEAVY,
         .textured = true,
         .candidates = PEN_CANDIDATES(""),

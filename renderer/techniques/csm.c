@@ -41,9 +41,8 @@ const struct technique technique_csm = {
                    "texture, and averages it over a fixed square of the map.",
         .citation = "T. Annen, T. Mertens, P. Bekaert, H.-P. Seidel, J. Kautz, Convolution shadow "
                     "maps, Eurographics Symposium on Rendering 2007",
-        .artefacts =
-            "The width of the edge is that of the filter, whatever the light; light bleeds "
-            "within the filter's width of where casters touch receivers, ripples at few terms.",
+        .artefacts = "The width of the edge is that of the filter, whatever the light; ripples at "
+                     "few terms; light seeps in near contacts of curved casters." BLENDED_GRAIN,
         .cost_class = PEN_COST_CHEAP,
         .textured = false,
         .struct_size = sizeof(struct csm),

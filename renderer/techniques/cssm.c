@@ -40,9 +40,10 @@ const struct technique technique_cssm = {
                    "it, both by lookups in prefiltered Fourier series of the depth test.",
         .citation = "T. Annen, Z. Dong, T. Mertens, P. Bekaert, H.-P. Seidel, J. Kautz, Real-time, "
                     "all-frequency shadows in dynamic scenes, ACM Trans. Graph. 27(3), 2008",
-        .artefacts = "Light bleeds where casters touch receivers, over a depth of about a term's "
-                     "width, with specks where a surface shadows itself closely; one average depth "
-                     "merges near and far casters.",
+        .artefacts = "Ripples at few terms, with specks where a surface shadows itself closely; "
+                     "light seeps in near "
+                     "contacts of curved casters; one average depth merges near and far "
+                     "casters." BLENDED_GRAIN,
         .cost_class = PEN_COST_MEDIUM,
         .textured = false,
         .struct_size = sizeof(struct cssm),

@@ -316,8 +316,9 @@ const struct technique technique_erosion = {
                    "distance to a line fitted to the edge.",
         .citation = "A. Klein, A. Nischwitz, P. Obermeier, Contact hardening soft shadows using "
                     "erosion, WSCG 2014",
-        .artefacts = "Shadow edges off the screen or behind an object have no penumbra; where many "
-                     "edges meet (foliage) the direct variant knows only the nearest.",
+        .artefacts =
+            "Shadow edges off the screen or behind an object have no penumbra; where many "
+            "edges meet (foliage) the direct variant knows only the nearest." BLENDED_GRAIN,
         .cost_class = PEN_COST_MEDIUM,
         .textured = false,
         .struct_size = sizeof(struct erosion),

@@ -43,8 +43,9 @@ const struct technique technique_evsm = {
                    "both bounds is the visibility.",
         .citation = "A. Lauritzen, M. McCool, Layered variance shadow maps, Graphics Interface "
                     "2008",
-        .artefacts = "Some light bleeds between casters that are close together in depth; sloped "
-                     "receivers lose contact within the width of the blur; 16 bytes a texel.",
+        .artefacts =
+            "Some light bleeds between casters that are close together in depth; sloped "
+            "receivers lose contact within the width of the blur; 16 bytes a texel." BLENDED_GRAIN,
         .cost_class = PEN_COST_CHEAP,
         .textured = false,
         .struct_size = sizeof(struct evsm),

@@ -41,7 +41,7 @@ const struct technique technique_msm = {
                    "moments allow (Hamburger moment problem).",
         .citation = "C. Peters, R. Klein, Moment shadow mapping, I3D 2015",
         .artefacts = "Light bleeds a little where three or more casters lie behind each other; "
-                     "edges have the width of the blur whatever the light.",
+                     "edges have the width of the blur whatever the light." BLENDED_GRAIN,
         .cost_class = PEN_COST_CHEAP,
         .textured = false,
         .struct_size = sizeof(struct msm),

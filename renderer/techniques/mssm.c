@@ -55,7 +55,7 @@ const struct technique technique_mssm = {
         .citation = "C. Peters, C. Muenstermann, N. Wetzstein, R. Klein, Improved moment shadow "
                     "maps for translucent occluders, soft shadows and single scattering, JCGT 2017",
         .artefacts = "Light bleeds a little where three or more casters lie behind each other; "
-                     "contacts on sloped receivers brighten; square kernels.",
+                     "contacts on sloped receivers brighten; square kernels." BLENDED_GRAIN,
         .cost_class = PEN_COST_MEDIUM,
         .textured = false,
         .candidates = PEN_CANDIDATES(""),

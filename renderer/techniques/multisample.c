@@ -100,7 +100,8 @@ const struct technique technique_multisample = {
                    "shadow map; converges to the true visibility.",
         .citation = "P. Heckbert, M. Herf, Simulating soft shadows with graphics hardware, "
                     "CMU-CS-97-104, 1997",
-        .artefacts = "Bands at few samples; texels of each map; cost grows with the samples.",
+        .artefacts =
+            "Bands at few samples; texels of each map; cost grows with the samples." BLENDED_GRAIN,
         .cost_class = PEN_COST_REFERENCE,
         .textured = true,
         .candidates = PEN_CANDIDATES("samples=64", "samples=256"),

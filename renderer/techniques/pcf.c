@@ -43,7 +43,7 @@ const struct technique technique_pcf = {
         .citation = "W. Reeves, D. Salesin, R. Cook, Rendering antialiased shadows with depth "
                     "maps, SIGGRAPH 1987",
         .artefacts = "The width of the edge is that of the filter, whatever the light and the "
-                     "distances; few taps show as bands.",
+                     "distances; few taps show as bands." BLENDED_GRAIN,
         .cost_class = PEN_COST_CHEAP,
         .textured = false,
         .candidates = PEN_CANDIDATES(""),

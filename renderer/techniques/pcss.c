@@ -55,8 +55,9 @@ const struct technique technique_pcss = {
         .summary = "Finds the average blocker depth, derives the width of the penumbra from it and "
                    "filters depth comparisons over that width.",
         .citation = "R. Fernando, Percentage-closer soft shadows, SIGGRAPH 2005 sketches",
-        .artefacts = "One average depth merges near and far casters; thin blockers can be missed "
-                     "by the search; seen from the centre of the light only.",
+        .artefacts = "One average depth merges near and far casters, which lets light through at "
+                     "the foot of a wall that reaches up to the light; thin blockers can be missed "
+                     "by the search; seen from the centre of the light only." BLENDED_GRAIN,
         .cost_class = PEN_COST_MEDIUM,
         .textured = false,
         .candidates = PEN_CANDIDATES("", "search_taps=32 filter_taps=64"),

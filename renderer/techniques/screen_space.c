@@ -37,7 +37,7 @@ const struct technique technique_screen_space = {
                     "M. MohammadBagher, J. Kautz, N. Holzschuch, C. Soler, Screen-space "
                     "percentage-closer soft shadows, SIGGRAPH 2010 posters",
         .artefacts = "Shadow edges off the screen or behind an object are missing from the blur, "
-                     "so penumbrae end at silhouettes; the light is a Gaussian.",
+                     "so penumbrae end at silhouettes; the light is a Gaussian." BLENDED_GRAIN,
         .cost_class = PEN_COST_MEDIUM,
         .textured = false,
         .struct_size = sizeof(struct screen_space),

@@ -47,7 +47,8 @@ const struct technique technique_stochastic = {
                     "sampled soft shadows, ACM TOG 31(6), 2012; H. Dammertz, D. Sewtz, J. Hanika, "
                     "H. Lensch, Edge-avoiding a-trous wavelet transform, HPG 2010",
         .artefacts = "Grain in narrow penumbrae and on small features, which antialiasing frames "
-                     "average out; steps of the maps where the penumbra is wider than the filter.",
+                     "average out; steps of the maps where the penumbra is wider than the "
+                     "filter." BLENDED_GRAIN,
         .cost_class = PEN_COST_MEDIUM,
         .textured = true,
         .struct_size = sizeof(struct stochastic),

@@ -327,7 +327,8 @@ const struct technique technique_temporal = {
                     "Schwarzler, O. Mattausch, M. Wimmer, Real-time soft shadows using temporal "
                     "coherence, ISVC 2009",
         .artefacts = "Bands in a session's first frames, where a surface comes into view, and "
-                     "without a session; shadows of animated casters follow a few frames late.",
+                     "without a session; shadows of animated casters follow a few frames "
+                     "late." BLENDED_GRAIN,
         .cost_class = PEN_COST_MEDIUM,
         .textured = true,
         .keeps_history = true,

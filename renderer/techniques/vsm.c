@@ -35,7 +35,7 @@ const struct technique technique_vsm = {
                    "Chebyshev's inequality.",
         .citation = "W. Donnelly, A. Lauritzen, Variance shadow maps, I3D 2006",
         .artefacts = "Light bleeds where a second caster lies behind the edge of the first; edges "
-                     "have the width of the blur whatever the light.",
+                     "have the width of the blur whatever the light." BLENDED_GRAIN,
         .cost_class = PEN_COST_CHEAP,
         .textured = false,
         .struct_size = sizeof(struct vsm),

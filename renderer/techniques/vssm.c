@@ -70,7 +70,7 @@ const struct technique technique_vssm = {
         .citation = "B. Yang, Z. Dong, J. Feng, H.-P. Seidel, J. Kautz, Variance soft shadow "
                     "mapping, Pacific Graphics 2010",
         .artefacts = "Light bleeds where a second caster lies behind the first in a penumbra; "
-                     "square kernels; steps where split parts compare few depths.",
+                     "square kernels; steps where split parts compare few depths." BLENDED_GRAIN,
         .cost_class = PEN_COST_MEDIUM,
         .textured = false,
         .candidates = PEN_CANDIDATES(""),

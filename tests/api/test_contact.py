@@ -122,6 +122,40 @@ class Contact(unittest.TestCase):
                 self.check_dark(scene, {**request, "lights": [light]}, methods,
                                 most=2 if light["type"] == "sphere" else 0)
 
+    def test_what_a_wall_hides_is_dark_however_far_it_reaches(self):
+        """A wall that reaches from the floor up to the light, the receiver behind it at its foot: the
+        one of a closed room that is lit within, and a thin one before a large light."""
+        walls = [((4.2, 0.1, 4.2), (0, 3.05, 0), 0), ((8, 0.1, 8), (0, -0.05, 0), 0)]
+        for side in (-2.05, 2.05):
+            walls += [((0.1, 3, 4.2), (side, 1.5, 0), 0), ((4, 3, 0.1), (0, 1.5, side), 0)]
+        lamp = {**rect(0, 2.5, 0), "target": [0.3, 0, 0.2]}
+        room = {"camera": {"eye": [7, 3, 7], "target": [1.5, 0, 1.5], "fov_y_deg": 45},
+                "lights": [lamp]}
+        thin = {"camera": {"eye": [0.3, 1.2, 3], "target": [0, 0.4, 0], "fov_y_deg": 45},
+                "lights": [rect(1, 4, -4)], "width": 640, "height": 480}
+        for scene, request, methods in ((solids(*walls), room, ("vssm", "mssm", "cssm")),
+                                        (wall_on_floor(0), thin, ("cssm", "mssm"))):
+            scene = self.d.upload(scene)
+            truth = self.visibility(scene, request, "raytraced")
+            for method in methods:
+                with self.subTest(method=method, camera=request["camera"]):
+                    seen = self.visibility(scene, request, method)
+                    lit = sum(v > 60 and t == 0 for v, t in zip(seen, truth))
+                    self.assertLessEqual(lit, 15 if request is room else 0)
+
+    def test_the_background_sees_every_light(self):
+        """Also in tiles that are filled as a whole."""
+        scene = self.d.upload(solids(((2, 2, 2), (0, 1, 0), 0)))
+        request = {"camera": {"eye": [1, 1, -6], "target": [0, 1, 0]}, "lights": [
+            {**SUN, "position": [0, 2, 5]}]}
+        answer = self.d.render(scene, {"width": 320, "height": 240, "ground": False, **request,
+                                       "technique": "none", "output": {"layer": "normal"}})
+        behind = [p == (128, 128, 128) for p in rgb(answer)]
+        for method in ("hard", "pcf", "pcss"):
+            with self.subTest(method=method):
+                seen = self.visibility(scene, request, method)
+                self.assertEqual({v for v, away in zip(seen, behind) if away}, {255})
+
     def test_closed_room_is_dark(self):
         scene = self.d.upload(solids(((4, 3, 4), (0, 1.5, 0), 0)))
         self.check_dark(scene, {

@@ -40,13 +40,14 @@ bool frame_layers_add_visibility(
 {
     struct average_block block = {.count = {(int32_t)light_count}};
     const struct frame_targets *t = job->targets;
-    struct pass_texture texture = {UNIT_SOURCE, t->vis.texture.name, GL_SAMPLE_NEAREST};
+    struct pass_texture textures[] = {{UNIT_SOURCE, t->vis.texture.name, GL_SAMPLE_NEAREST},
+        {UNIT_DEPTH, frame_data_gbuffer(job)->depth.texture.name, GL_SAMPLE_NEAREST}};
     return pass_fill(job->ctx,
         &(struct pass_fill){.name = "average",
             .fragment = "average.frag",
             .stage = PEN_STAGE_SHADE,
-            .textures = &texture,
-            .texture_count = 1,
+            .textures = textures,
+            .texture_count = 2,
             .framebuffer = t->visibility.framebuffer,
             .width = job->request->width,
             .height = job->request->height,

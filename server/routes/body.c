@@ -23,6 +23,19 @@ static bool is_one_of(const char *type, const char *const *types)
     return false;
 }
 
+/* What programs write that do not know a file's type, or know it by another name. The bytes will
+ * say; what is surely something else, a web page or a picture of another kind, is refused. */
+static bool says_little(const char *type, enum pen_body takes)
+{
+    static const char *const families[] = {
+        "application/", "binary/", "model/", "multipart/x-", NULL};
+    static const char *const images[] = {"image/jpg", "image/pjpeg", "image/x-png", NULL};
+    for (const char *const *family = families; *family; family++)
+        if (!strncasecmp(type, *family, strlen(*family)))
+            return true;
+    return takes == PEN_BODY_IMAGE_UPLOAD && is_one_of(type, images);
+}
+
 static bool is_longer(const struct http_exchange *x, uint64_t limit)
 {
     return x->content_length != HTTP_UNKNOWN_LENGTH && x->content_length > limit;
@@ -63,8 +76,7 @@ static bool open_upload(struct call_body *body, struct service *s, enum pen_body
     char entry[PEN_BUNDLE_MAX_NAME + 1];
     if (service_is_draining(s))
         return pen_fail(error, PEN_UNAVAILABLE, "", "The service is shutting down.");
-    /* What curl sends of its own accord says nothing; the bytes will. */
-    if (!type || is_one_of(type, (const char *const[]){"application/x-www-form-urlencoded", NULL}))
+    if (!type || (!is_one_of(type, pen_upload_types(takes)) && says_little(type, takes)))
         type = "application/octet-stream";
     if (!is_one_of(type, pen_upload_types(takes)))
         return pen_fail(error, PEN_UNKNOWN_TYPE, "",

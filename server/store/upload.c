@@ -164,12 +164,12 @@ static bool put_part(struct upload *u, int to, const struct part *part, struct p
     return true;
 }
 
+/* Whatever it is called ("blob", when a program did not say): its bytes say what it is. A glTF that
+ * is JSON has other files as a rule, and says which are missing. */
 static bool stands_alone(const char *name)
 {
     const char *dot = strrchr(name, '.');
-    return dot &&
-           (!strcasecmp(dot, ".glb") || !strcasecmp(dot, ".zip") || !strcasecmp(dot, ".png") ||
-               !strcasecmp(dot, ".jpg") || !strcasecmp(dot, ".jpeg") || !strcasecmp(dot, ".webp"));
+    return !dot || strcasecmp(dot, ".gltf");
 }
 
 /* Spool to source: the bundle's header and entries, or the only file. */

@@ -162,6 +162,9 @@ class Uploads(unittest.TestCase):
                     ("PUT", "/v1/scenes/" + scene, None), ("POST", "/v1/scenes", None),
                     ("POST", "/v1/scenes", "application/x-www-form-urlencoded"),
                     ("POST", "/v1/scenes", "application/octet-stream"),
+                    ("POST", "/v1/scenes", "binary/octet-stream"),
+                    ("POST", "/v1/scenes", "application/x-zip"),
+                    ("POST", "/v1/scenes", "model/vnd.gltf.binary"),
                     ("POST", "/v1/scenes", "model/gltf-binary")):
                 answer = self.d.call(method, path, body, {"Content-Type": kind} if kind else {})
                 self.assertEqual((answer.status, answer.json()["id"]), (status, scene), answer.body)
@@ -169,15 +172,18 @@ class Uploads(unittest.TestCase):
         self.assertEqual(self.d.call("PUT", "/v1/scenes", b"hello world").status, 415)
         image = self.post(png(3, 2), "application/x-www-form-urlencoded", "/v1/images")
         self.assertEqual(image.status, 201)
+        self.assertEqual(self.post(png(3, 2), "image/x-png", "/v1/images").status, 200)
         self.d.call("DELETE", "/v1/images/" + image.json()["id"])
+        self.assertEqual(self.post(glb, "text/plain").status, 415)
         self.assertEqual(self.post(glb, "text/html").status, 415)
         self.assertEqual(self.d.call("GET", "/v1/scenes/any.glb").status, 404)
 
     def test_single_file_form(self):
         glb = grid_scene(2, "form")
         scene = self.post(glb, "model/gltf-binary").json()["id"]
-        form = self.post(*multipart([("any name.glb", glb)]))
-        self.assertEqual((form.status, form.json()["id"]), (200, scene))
+        for name in ("any name.glb", "blob", "C:\\fakepath\\upload.bin", "a.b.c"):
+            form = self.post(*multipart([(name, glb)]))
+            self.assertEqual((form.status, form.json()["id"]), (200, scene), name)
 
     def test_zip(self):
         gltf, binary = gltf_with_buffer()
@@ -188,6 +194,19 @@ class Uploads(unittest.TestCase):
         answer = self.post(packed.getvalue(), "application/zip")
         self.assertEqual(answer.status, 201, answer.body)
         self.assertEqual(answer.json()["triangles"], 1)
+
+    def test_zip_entries_that_nobody_can_mean(self):
+        """The icon of a macOS folder, names too long, outside, of control characters: left out."""
+        gltf, binary = gltf_with_buffer()
+        for name in ("Icon\r", "n" * 300, "../x", "/x", "note: x", "a//b", "a\x01b"):
+            packed = io.BytesIO()
+            with zipfile.ZipFile(packed, "w") as z:
+                z.writestr(name, b"x")
+                z.writestr("scene.gltf", gltf)
+                z.writestr("mesh.bin", binary)
+            answer = self.post(packed.getvalue(), "application/zip")
+            self.assertEqual(answer.status, 201, (name, answer.body))
+            self.assertEqual((answer.json()["triangles"], answer.json()["warnings"]), (1, []))
 
     def test_bad_forms(self):
         gltf, binary = gltf_with_buffer()

@@ -116,9 +116,10 @@ static bool zip_table(
                 IMP_MAX_ZIP_BYTES);
         unpacked += entry.size;
         char *name = copy_name(entry.name, length);
-        if (!name)
-            return pen_fail(error, PEN_INVALID, "", "Entry %lld of the zip has an unusable name.",
-                (long long)i);
+        if (!name) { /* no glTF can mean it: a folder's icon, a path that leads outside */
+            files->unusable++;
+            continue;
+        }
         files->items[files->count++] =
             (struct imp_file){.name = name, .bytes = (size_t)entry.size, .zip_entry = (uint64_t)i};
     }
@@ -229,7 +230,10 @@ static const struct imp_file *no_document(const struct imp_files *files, struct 
             "There is no .glb or .gltf among the files, but there is \"%s\". %s",
             imp_text(files->items[i].name).s, why);
     else
-        pen_fail(error, PEN_INVALID, "", "There is no .glb or .gltf among the files.");
+        pen_fail(error, PEN_INVALID, "", "There is no .glb or .gltf among the files.%s",
+            files->unusable ? " Entries of the zip with unusable names, such as absolute ones, are "
+                              "left out."
+                            : "");
     return NULL;
 }
 

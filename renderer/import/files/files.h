@@ -23,12 +23,14 @@ struct imp_file {
 struct imp_files {
     struct imp_file *items;
     uint32_t count;
+    uint32_t unusable;      /* entries of a zip that are left out for their names */
     struct pen_names names; /* of the items */
     struct zip *zip;
 };
 
 /* Reads the table of a bundle (bundle.h) or zip; the data must outlive *files. On failure *files is
- * empty. Errors: PEN_INVALID (damaged, unsafe or duplicate names, encrypted), PEN_TOO_BIG. */
+ * empty. Errors: PEN_INVALID (damaged, duplicate names, encrypted; in a bundle unsafe names, which a
+ * zip's entry is left out for), PEN_TOO_BIG. */
 bool imp_files_open_bundle(
     struct imp_files *files, const uint8_t *data, size_t bytes, struct pen_error *error);
 bool imp_files_open_zip(

@@ -6,11 +6,11 @@
 #include "renderer/passes/draw/screen.h"
 #include "renderer/passes/draw/tiles.h"
 #include "renderer/passes/draw/turn.h"
+#include "renderer/scene/cover.h"
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 
-_Static_assert(OPEN_TILE == 4, "edge_tiles.frag looks at so many");
+_Static_assert(OPEN_TILE == 4 && COVER_TILE == 4, "edge_tiles.frag looks at so many");
 
 #define BAND_PIXELS (4u << 20) /* whose places are in memory together: 64 MiB */
 
@@ -29,7 +29,7 @@ static bool find_tiles(
     struct gl_target *target = pass_targets(job->ctx, &key);
     uint32_t width = (job->request->width + OPEN_TILE - 1) / OPEN_TILE;
     uint32_t height = (job->request->height + OPEN_TILE - 1) / OPEN_TILE;
-    gl_target_fit(target, GL_RG32F, width, height, 0, 1);
+    gl_target_fit(target, GL_RGBA32F, width, height, 0, 1);
     bool layered = frame_is_layered(job);
     struct pass_texture depths[] = {
         {UNIT_DEPTH, job->targets->gbuffer.depth.texture.name, GL_SAMPLE_NEAREST},
@@ -48,17 +48,19 @@ static bool find_tiles(
         error);
 }
 
-/* Into which tiles triangles have to be drawn once more, and before what. The caller frees it. */
-static float *read_tiles(const struct frame_job *job, const struct gl_texture *tiles)
+/* Of which pixels places have to be known, and before what. The caller frees it. */
+static struct cover_tile *read_tiles(const struct frame_job *job, const struct gl_texture *tiles)
 {
     size_t n = (size_t)tiles->width * tiles->height;
-    float *found = pen_alloc(2 * n, sizeof *found);
+    float(*found)[4] = pen_alloc(n, sizeof *found);
+    struct cover_tile *wanted = pen_alloc(n, sizeof *wanted);
     gl_timer_begin(&job->ctx->timer, PEN_STAGE_SHADE, "edge tiles");
-    gl.GetTextureImage(tiles->name, 0, GL_RG, GL_FLOAT, (GLsizei)(2 * n * sizeof *found), found);
+    gl.GetTextureImage(tiles->name, 0, GL_RGBA, GL_FLOAT, (GLsizei)(n * sizeof *found), found);
     for (size_t i = 0; i < n; i++)
-        found[i] = found[2 * i] == (float)TILE_LIT ? 2 : found[2 * i + 1];
+        wanted[i] = (struct cover_tile){found[i][1], (uint32_t)(found[i][2] + 0.5f)};
     gl_timer_end(&job->ctx->timer);
-    return found;
+    free(found);
+    return wanted;
 }
 
 static bool blend(const struct frame_job *job, const struct gl_texture *picture,
@@ -113,27 +115,24 @@ bool frame_edges_blend(const struct frame_job *job, const struct view *view, boo
     struct frame_targets *t = job->targets;
     const struct pen_request *r = job->request;
     bool layered = frame_is_layered(job);
-    char defines[64];
-    snprintf(defines, sizeof defines, "%s%s", layered ? "#define LAYERED\n" : "",
+    char defines[96];
+    snprintf(defines, sizeof defines, "%s%s%s", layered ? "#define LAYERED\n" : "",
+        job->ctx->software ? "#define GATHERED\n" : "",
         resolved ? "#define RESOLVED\n"
         : raw    ? "#define RAW\n"
                  : "");
-    uint32_t most = BAND_PIXELS / r->width;
+    uint32_t most = BAND_PIXELS / r->width / OPEN_TILE * OPEN_TILE;
     const struct gl_texture *tiles;
     if (!fill(job, resolved, raw, error) || !find_tiles(job, &tiles, error))
         return false;
     bool ok = true;
-    /* Elsewhere than in software triangles cost less than to wait for what was drawn. */
-    float *farthest = job->ctx->software ? read_tiles(job, tiles) : NULL;
-    struct pick_tiles wanted = {tiles->width, tiles->height, (float)r->width / OPEN_TILE,
-        (float)r->height / OPEN_TILE, .farthest = farthest};
-    memcpy(wanted.world_to_clip, view->world_to_clip, sizeof wanted.world_to_clip);
-    const struct pick_tiles *only = farthest ? &wanted : NULL;
+    /* Elsewhere than in software it costs less to draw all than to wait for what was drawn. */
+    struct cover_tile *wanted = job->ctx->software ? read_tiles(job, tiles) : NULL;
     for (uint32_t first = 0; ok && first < r->height; first += most) {
         uint32_t rows = r->height - first < most ? r->height - first : most;
         struct places_pass solid = {
-            layered ? PLACES_SOLID : PLACES_ALL, r->ground.on, first, rows, only};
-        struct places_pass front = {PLACES_BLENDED, false, first, rows, only};
+            layered ? PLACES_SOLID : PLACES_ALL, r->ground.on, first, rows, wanted};
+        struct places_pass front = {PLACES_BLENDED, false, first, rows, wanted};
         struct edges_block block;
         ok = pass_places(job->ctx, job->scene, view, &solid, &t->places, &block, error) &&
              (!layered || pass_places(job->ctx, job->scene, view, &front, &t->front_places, &block,
@@ -141,6 +140,6 @@ bool frame_edges_blend(const struct frame_job *job, const struct view *view, boo
              blend(job, resolved ? &t->stairs.texture : &t->beauty.texture, defines, &block, tiles,
                  error);
     }
-    free(farthest);
+    free(wanted);
     return ok;
 }

@@ -223,13 +223,7 @@ void frame_output_aim(const struct frame_job *job, const struct view *v, uint32_
     if (r->background[0] != PEN_AUTO && !pen_request_is_transparent(r))
         memcpy(b.background, r->background, 12);
     memcpy(b.ground_albedo, r->ground_albedo, 12);
-    float center[3], radius = scene_radius(job->scene);
-    scene_center(job->scene, center);
-    bool empty = scene_is_empty(job->scene);
-    b.ground[0] = center[0], b.ground[2] = center[2];
-    /* A hair below the bounds, so that a floor of the scene itself hides it. */
-    b.ground[1] = (empty ? 0 : scene_floor(job->scene)) - 1e-4f * radius;
-    b.ground[3] = 12 * radius;
+    scene_ground(job->scene, b.ground);
     b.display[0] = exp2f(r->exposure_ev);
     b.display[1] = (float)r->tone_map;
     b.display[2] = (float)number;

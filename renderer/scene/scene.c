@@ -467,18 +467,12 @@ static bool is_inside(const struct scene *s, const struct scene_group *g, const 
     return false;
 }
 
-static bool culls_back(
+bool scene_culls_back(
     const struct scene *s, const struct scene_group *group, const struct cull_view *view)
 {
     if (view->faces == CULL_CLOSED)
         return group->closed && (view->parallel || !is_inside(s, group, view->eye));
     return view->faces == CULL_SINGLE_SIDED && !group->double_sided;
-}
-
-static void use_indices(const struct scene *s, GLuint buffer)
-{
-    gl.VertexArrayElementBuffer(s->depth_array, buffer);
-    gl.VertexArrayElementBuffer(s->full_array, buffer);
 }
 
 static bool needs_textures(const struct scene_pass *pass, const struct scene_group *group)
@@ -494,7 +488,7 @@ struct run {
 
 /* Fills the piece: what is to be drawn of each group. Returns the triangles. */
 static uint64_t gather(struct scene *s, const struct cull_view *view, const struct scene_pass *pass,
-    struct cull_piece *piece, struct run *runs, uint32_t *run_count, struct picked *picked)
+    struct cull_piece *piece, struct run *runs, uint32_t *run_count)
 {
     struct cull_list list = {&s->blob, s->meshlet_areas, s->command_room, 0, s->command_count, 1};
     uint64_t triangles = 0;
@@ -502,17 +496,14 @@ static uint64_t gather(struct scene *s, const struct cull_view *view, const stru
     for (; piece->group < s->group_count; piece->group++, piece->instance = 0) {
         const struct scene_group *group = &s->groups[piece->group];
         struct run *run = &runs[*run_count];
-        *run = (struct run){piece->group, list.count, 0, culls_back(s, group, view)};
+        *run = (struct run){piece->group, list.count, 0, scene_culls_back(s, group, view)};
         list.weight = needs_textures(pass, group) ? CULL_TEXTURED_WEIGHT : 1;
         if (pass->blended && !group->blend)
             continue;
         for (; piece->instance < group->count && !piece->more; piece->instance++) {
             uint32_t instance = s->order[group->first + piece->instance];
-            uint32_t before = list.count;
             if (!pass->hidden || !pass->hidden[instance])
                 triangles += cull_instance(view, instance, run->cull_back, &list, piece);
-            if (pass->tiles)
-                pick_triangles(pass->tiles, &s->blob, s->command_room, before, &list.count, picked);
             if (piece->more)
                 break;
         }
@@ -523,17 +514,15 @@ static uint64_t gather(struct scene *s, const struct cull_view *view, const stru
         if (piece->more)
             break;
     }
-    return pass->tiles ? picked->count / 3 : triangles;
+    return triangles;
 }
 
 uint64_t scene_draw(struct scene *s, const struct cull_view *view, const struct scene_pass *pass,
     struct cull_piece *piece)
 {
-    struct picked picked = {0};
-    GLuint own = 0;
     uint32_t run_count = 0;
     struct run *runs = pen_alloc_zero(s->group_count + 1, sizeof *runs);
-    uint64_t triangles = gather(s, view, pass, piece, runs, &run_count, &picked);
+    uint64_t triangles = gather(s, view, pass, piece, runs, &run_count);
     if (!run_count)
         goto done;
     const struct run *last = &runs[run_count - 1];
@@ -541,12 +530,6 @@ uint64_t scene_draw(struct scene *s, const struct cull_view *view, const struct 
         (GLsizeiptr)((last->first + last->count) * sizeof *s->command_room), s->command_room,
         GL_STREAM_DRAW);
     gl.BindBuffer(GL_DRAW_INDIRECT_BUFFER, s->commands);
-    if (pass->tiles) {
-        gl.CreateBuffers(1, &own);
-        gl.NamedBufferStorage(
-            own, (GLsizeiptr)(picked.count * sizeof *picked.indices), picked.indices, 0);
-        use_indices(s, own);
-    }
     for (const struct run *run = runs; run <= last; run++) {
         const struct scene_group *group = &s->groups[run->group];
         bool textured = needs_textures(pass, group);
@@ -571,11 +554,7 @@ uint64_t scene_draw(struct scene *s, const struct cull_view *view, const struct 
     gl.FrontFace(GL_CCW);
     for (GLuint i = 0; i < SCENE_UNITS; i++)
         gl.BindSampler(i, 0);
-    if (own)
-        use_indices(s, s->indices);
-    gl.DeleteBuffers(1, &own);
 done:
-    pick_finish(&picked);
     free(runs);
     return triangles;
 }

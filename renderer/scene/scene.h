@@ -2,7 +2,6 @@
 #pragma once
 #include "renderer/blob/pscene.h"
 #include "renderer/scene/cull.h"
-#include "renderer/scene/pick.h"
 #include "renderer/scene/stage.h"
 #include "renderer/gl/program.h"
 #include "renderer/gl/texture.h"
@@ -91,6 +90,8 @@ bool scene_set_pose(
 void scene_measure(struct scene *scene);
 /* What a ground lies under, m: the stage's lowest point, or that of the rest pose. */
 float scene_floor(const struct scene *scene);
+/* The square that a ground is: centre x, height, centre z, half side. */
+void scene_ground(const struct scene *scene, float ground[4]);
 
 bool scene_is_empty(const struct scene *scene);
 /* Of the sphere around the stage, m; >= 1e-9. Cameras and lights are chosen to suit it: a floor
@@ -112,11 +113,13 @@ void scene_instance_bounds(
 struct scene_pass {
     GLuint opaque, textured;
     bool full; /* draws with all attributes and textures; else positions only where it can */
-    bool front_is_clockwise;        /* the target's y axis is flipped */
-    const bool *hidden;             /* instances to leave out, or NULL */
-    bool blended;                   /* BLEND materials alone */
-    const struct pick_tiles *tiles; /* only triangles that may be seen there; NULL: all */
+    bool front_is_clockwise; /* the target's y axis is flipped */
+    const bool *hidden;      /* instances to leave out, or NULL */
+    bool blended;            /* BLEND materials alone */
 };
+/* Whether the group's triangles that turn their back to the view are left out. */
+bool scene_culls_back(
+    const struct scene *s, const struct scene_group *group, const struct cull_view *view);
 /* Draws one piece, and tells in it where the next one begins: what all pieces leave is what the whole
  * drawn at once does. Returns the triangles drawn. The caller has bound framebuffer, viewport and depth
  * state. */

@@ -12,11 +12,11 @@ struct places_pass {
     enum places_kind kind;
     bool ground;
     uint32_t first, rows;           /* of the picture */
-    const struct pick_tiles *tiles; /* elsewhere depths may be missing; or NULL */
+    const struct cover_tile *tiles; /* the CPU draws what these want; NULL: OpenGL draws all */
 };
 
 /* What the view sees at EDGE_PLACES places of the pixels in some rows, into a target of so many
- * samples. `where`: the places. */
+ * samples, or on the CPU of so many components. `where`: the places. */
 bool pass_places(struct technique_ctx *ctx, struct scene *scene, const struct view *view,
     const struct places_pass *which, struct gl_target *depths, struct edges_block *where,
     struct pen_error *error);

@@ -5,19 +5,28 @@
 // ALONE: only what the file holds of each pixel without its neighbours.
 // LAYERED: blended surfaces lie in front of some pixels, and a plane has to explain what is solid
 // while the plane of the first of them explains what is nearest.
+// GATHERED: the depths lie in one texel.
 #include "view.glsl"
 #include "octahedral.glsl"
 #include "display.glsl"
-#include "edge_pixel.glsl"
 #include "edges.def"
 
+#ifdef GATHERED
+#define Places sampler2D
+#else
+#define Places sampler2DMS
+#endif
+
+layout(binding = UNIT_DEPTH) uniform sampler2D g_depth;
 layout(binding = UNIT_NORMAL) uniform sampler2D g_normal;
-layout(binding = UNIT_PLACES) uniform sampler2DMS place_depths; // of some rows
+layout(binding = UNIT_TILES) uniform sampler2D tile_classes; // of edge_tiles.frag
+layout(binding = UNIT_PLACES) uniform Places place_depths;   // of some rows
 layout(binding = UNIT_SOURCE) uniform sampler2D picture;
 
 #ifdef LAYERED
+layout(binding = UNIT_BEFORE) uniform sampler2D front_depth; // of the first blended layer
 layout(binding = UNIT_FRONT_NORMAL) uniform sampler2D front_normal;
-layout(binding = UNIT_FRONT_PLACES) uniform sampler2DMS front_places;
+layout(binding = UNIT_FRONT_PLACES) uniform Places front_places;
 #endif
 
 layout(location = 0) out vec4 color;
@@ -54,6 +63,29 @@ vec3 plane_of(float depth, vec2 normal, ivec2 pixel, vec3 right, vec3 up)
     vec2 slope = vec2(dot(n, right), -dot(n, up)) / view.eye.w;
     return vec3(
         depth, slope * (depth / min(dot(n, view.forward.xyz) + dot(slope, centred), -1e-4)));
+}
+
+float depth_at(ivec2 pixel)
+{
+    return texelFetch(g_depth, pixel, 0).r;
+}
+
+vec4 depths_of(Places all, ivec2 pixel)
+{
+#ifdef GATHERED
+    return texelFetch(all, pixel, 0);
+#else
+    vec4 depths;
+    for (int i = 0; i < EDGE_PLACES; i++)
+        depths[i] = texelFetch(all, pixel, i).r;
+    return depths;
+#endif
+}
+
+bool may_show_edge(ivec2 pixel)
+{
+    int bits = int(texelFetch(tile_classes, pixel / 4, 0).b + 0.5);
+    return (bits >> (pixel.y % 4 * 4 + pixel.x % 4) & 1) != 0;
 }
 
 struct Planes {
@@ -102,18 +134,17 @@ void main()
     color = alone(texelFetch(picture, pixel, 0));
 #ifndef ALONE
     // Loops, since software rasterisers leave them out where no pixel needs them.
-    int around = may_show_edge(pixel, last) ? 8 : 0;
+    int around = may_show_edge(pixel) ? 8 : 0;
     vec3 right = vec3(0.0), up = vec3(0.0);
     vec4 depths = vec4(0.0), front = vec4(0.0), own = vec4(0.0), open = vec4(0.0);
     for (int once = 0; once < around; once += 8) {
         right = normalize(cross(view.forward.xyz,
             vec3(view.world_to_clip[0].y, view.world_to_clip[1].y, view.world_to_clip[2].y)));
         up = cross(right, view.forward.xyz);
-        for (int i = 0; i < EDGE_PLACES; i++)
-            depths[i] = texelFetch(place_depths, pixel - ivec2(0, edge.rows.x), i).r;
+        ivec2 at = pixel - ivec2(0, edge.rows.x);
+        depths = depths_of(place_depths, at);
 #ifdef LAYERED
-        for (int i = 0; i < EDGE_PLACES; i++)
-            front[i] = max(depths[i], texelFetch(front_places, pixel - ivec2(0, edge.rows.x), i).r);
+        front = max(depths, depths_of(front_places, at));
 #endif
         // 0 where the pixel's own plane explains the place.
         own = match_both(planes_at(pixel, right, up), depths, front, vec2(0.0));

@@ -58,8 +58,7 @@ vec4 material_base(uint material, vec4 uv, vec4 color)
     return base;
 }
 
-// A blended surface that hides all but this share of what is behind it is solid.
-const float solid_alpha = 0.998;
+const float solid_alpha = float(SOLID_PER_MILLE) / 1000.0;
 
 // Blended surfaces are cut by a threshold; an alpha that is no number is 0.
 bool alpha_is_cut(uint material, float alpha, float threshold)

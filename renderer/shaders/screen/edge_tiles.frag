@@ -1,10 +1,15 @@
-// One fragment per tile of 4 x 4 pixels: may one of them show an edge?
+// One fragment per tile of 4 x 4 pixels: which of them may show more than the plane at their
+// centre? LAYERED: or more than the plane of the blended surface in front.
 #include "view.glsl"
-#include "edge_pixel.glsl"
 #include "tile_class.def"
 
-// Class / 255; the farthest depth in the tile and beside it.
-layout(location = 0) out vec2 tile_class;
+layout(binding = UNIT_DEPTH) uniform sampler2D g_depth;
+#ifdef LAYERED
+layout(binding = UNIT_BEFORE) uniform sampler2D front_depth; // of the first blended layer
+#endif
+
+// Class / 255; the farthest depth in the tile and beside it; a bit for each pixel, row by row.
+layout(location = 0) out vec4 tile_class;
 
 // Depths of four pixels in a row, and of those beside them.
 struct Row {
@@ -22,6 +27,15 @@ Row upper_row(vec4 a, vec4 b, vec4 c)
 Row lower_row(vec4 a, vec4 b, vec4 c)
 {
     return Row(a.x, vec4(a.y, b.x, b.y, c.x), c.y);
+}
+
+// Of four pixels, and of those beside them: along a plane a depth is the mean of those on either
+// side.
+bvec4 are_bent(vec4 left, vec4 right, vec4 above, vec4 below, vec4 depth)
+{
+    vec4 bend = max(abs(left + right - 2.0 * depth), abs(above + below - 2.0 * depth));
+    vec4 rise = abs(left - right) + abs(above - below) + 2e-4 * depth;
+    return greaterThan(bend, 0.1 * rise);
 }
 
 int bits_of_row(Row above, Row row, Row below)
@@ -60,5 +74,6 @@ void main()
 #ifdef LAYERED
     bent |= bent_pixels(first, true, farthest);
 #endif
-    tile_class = vec2(float(bent != 0 ? TILE_UNDECIDED : TILE_LIT) / 255.0, farthest);
+    tile_class =
+        vec4(float(bent != 0 ? TILE_UNDECIDED : TILE_LIT) / 255.0, farthest, float(bent), 0.0);
 }

@@ -1,0 +1,33 @@
+/* Depths at several places of some pixels, drawn by the CPU. Software rasterisers take longer for
+ * each triangle, and for all the pixels of which nobody asks. */
+#pragma once
+#include "renderer/scene/scene.h"
+
+enum { COVER_PLACES = 4, COVER_TILE = 4 };
+typedef float cover_places __attribute__((vector_size(4 * COVER_PLACES)));
+
+/* COVER_TILE x COVER_TILE pixels. */
+struct cover_tile {
+    float farthest;  /* depth (reversed) that is wanted there */
+    uint32_t pixels; /* that are: a bit each, row by row */
+};
+
+struct cover {
+    mat4 world_to_clip;
+    uint32_t width, height;                         /* of the picture */
+    uint32_t first, rows;                           /* that are drawn */
+    const struct cover_tile *tiles;                 /* of the whole picture */
+    float across[COVER_PLACES], down[COVER_PLACES]; /* of the places, from a pixel's centre, px */
+    cover_places *depths; /* width x rows; 0 to begin with; what is not wanted may stay */
+};
+
+struct cover_scene {
+    bool blended;    /* BLEND materials alone */
+    float threshold; /* of their alpha: what has more is there */
+};
+
+/* One piece of it, as scene_draw() does; `view` may leave out what is not in the rows. */
+void cover_scene(struct scene *scene, const struct cull_view *view, const struct cover_scene *what,
+    const struct cover *cover, struct cull_piece *piece);
+/* A triangle of world space. */
+void cover_one_triangle(const float (*corners)[3], const struct cover *cover);

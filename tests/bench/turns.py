@@ -5,7 +5,8 @@
 
 beside   While one client keeps a multisample picture of 256 maps, 16 jittered frames, 1600 x 1200
          going, another asks for pcss pictures of 480 x 360: their times beside those of an idle
-         daemon, and what share of the renderer the long one had while the other waited.
+         daemon, what share of the renderer they took, and how many samples the long one got done in
+         what was left, compared with one that is alone.
 leave    Long renders of all sampled methods are begun and left, or their deadline passes: how long
          after that the worker has nothing to do any more.
 cut      Requests that are cut off at random moments: memory, descriptors, what is in GPU memory and
@@ -54,12 +55,24 @@ class Bench:
                 "Content-Type": "model/gltf-binary", "Authorization": "Bearer " + QUICK})
         self.scene = answer.json()["id"]
 
-    def begin(self, request):
+    def begin(self, request, **headers):
         connection = http.client.HTTPConnection("127.0.0.1", self.daemon.port)
         connection.request("POST", "/v1/scenes/%s/render" % self.scene, json.dumps(request),
                            {"Content-Type": "application/json", "Cache-Control": "no-cache",
-                            "Authorization": "Bearer " + PATIENT})
+                            "Authorization": "Bearer " + PATIENT, **headers})
         return connection
+
+    def begin_best(self, ms):
+        """The long one, which ends after so many ms with what it has."""
+        return self.begin(dict(LONG, deadline_ms=ms, on_deadline="best"),
+                          Accept="application/json")
+
+    @staticmethod
+    def samples(connection):
+        progress = json.loads(connection.getresponse().read())["progress"]
+        if progress["samples"] == progress["of"]:
+            raise SystemExit("the long one has ended too early to tell")
+        return progress["samples"]
 
     def ask(self, request, **headers):
         return self.daemon.render(self.scene, request, timeout=600,
@@ -82,24 +95,23 @@ class Bench:
         self.timed(SHORT)
         alone = [self.timed(SHORT) for _ in range(20)]
         print("pcss alone:            " + describe(alone), flush=True)
-        long = self.begin(LONG)
+        undisturbed = self.samples(self.begin_best(300 * self.tries))
+        used, beside, ms = [], [], 750 * self.tries
+        end = time.monotonic() + 1e-3 * ms
+        long = self.begin_best(ms)
         self.until(1)
-        used = []
-        beside = []
-        for _ in range(self.tries):
+        while time.monotonic() < end - 2 and len(beside) < self.tries:
             time.sleep(0.5)
             record = self.ask(SHORT, Accept="application/json").json()
             used.append(record["renderer"]["used_ms"])
             beside.append(self.timed(SHORT))
-        ended = self.running() != 1
-        long.close()
-        self.until(0)
+        disturbed = self.samples(long)
+        taken = 2 * sum(used)  # of two requests each that is told once
         print("beside the long one:   " + describe(beside), flush=True)
         print("added at p99:          %.0f ms" % (percentile(beside, 0.99) - percentile(alone, 0.99)))
-        # Two in each 500 ms and what they take.
-        print("the long one gave up:  %.1f %% of the renderer%s" % (
-            1e2 * 2 * sum(used) / (500 * len(used) + 2 * sum(beside)),
-            " (it has ended too early to tell)" if ended else ""), flush=True)
+        print("the others took:       %.1f %% of the renderer" % (1e2 * taken / ms))
+        lost = 1 - disturbed / (ms - taken) / (undisturbed / (300 * self.tries))
+        print("the long one lost:     %.1f %% of the rest" % (1e2 * lost), flush=True)
 
     def leave(self):
         self.timed(TINY)

@@ -102,6 +102,7 @@ struct pen_trace_scene {
     _Atomic int64_t bytes; /* everything */
     atomic_bool over_budget;
     struct pen_trace_scene_info info;
+    double tile_ms; /* what a sample of an image's tile took at most, lately */
 };
 
 /* The context of a query: Embree's own first, so that filters can cast back. */

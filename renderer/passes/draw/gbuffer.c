@@ -5,7 +5,8 @@
 
 #define FIRST_PIXELS (1u << 15)
 
-static void fit(
+/* True when memory was taken. */
+static bool fit(
     struct gbuffer *g, uint32_t width, uint32_t height, bool emission, enum gbuffer_kind kind)
 {
     bool made = gl_target_fit(&g->depth, GL_DEPTH_COMPONENT32F, width, height, 0, 1);
@@ -20,11 +21,12 @@ static void fit(
         made = true;
     }
     if (!made && g->framebuffer)
-        return;
+        return false;
     gl.DeleteFramebuffers(1, &g->framebuffer);
     const struct gl_texture *colors[] = {
         &g->normal.texture, &g->albedo.texture, &g->surface.texture, &g->emission.texture};
     g->framebuffer = gl_framebuffer_create(colors, emission ? 4 : 3, &g->depth.texture);
+    return true;
 }
 
 static GLuint program(struct technique_ctx *ctx, const char *use, bool emission,
@@ -75,7 +77,8 @@ bool pass_gbuffer(struct technique_ctx *ctx, struct scene *scene, const struct v
     const struct gbuffer_pass *how, struct gbuffer *g, uint64_t *triangles, struct pen_error *error)
 {
     bool emission = scene->has_emission || scene->has_unlit;
-    fit(g, view->width, view->height, emission, how->kind);
+    if (fit(g, view->width, view->height, emission, how->kind) && !pass_turn(ctx, error))
+        return false;
     struct scene_pass pass = {.full = true, .blended = how->kind == GBUFFER_LAYER};
     pass.opaque = program(ctx, "", emission, GBUFFER_HASHED, error);
     pass.textured = program(ctx, "#define TEXTURED\n", emission, how->kind, error);

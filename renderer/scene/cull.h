@@ -31,7 +31,8 @@ struct cull_piece {
     double work;   /* what it does cost */
     /* Where it begins, and then where the next one does: all 0 is the beginning. */
     uint32_t group, instance, meshlet, index;
-    bool more; /* there is a next one */
+    bool more;     /* there is a next one */
+    bool compiles; /* the driver may have to compile for it: it says nothing of others */
 };
 
 /* What is to be drawn of a scene. */
@@ -43,9 +44,9 @@ struct cull_list {
     double weight; /* a pixel's work */
 };
 
-/* Work of a change of textures, for which a driver may have to compile, and of a pixel that looks at
- * some, compared with one that only has a depth. */
-#define CULL_STATE_WORK (1u << 19)
+/* Work of a change of materials, and of a pixel that looks at textures, compared with one that only has
+ * a depth. */
+#define CULL_STATE_WORK (1u << 16)
 #define CULL_TEXTURED_WEIGHT 8
 
 /* Appends the visible runs of one instance, from the piece's meshlet and index on (neighbouring

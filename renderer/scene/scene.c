@@ -1,4 +1,5 @@
 #include "renderer/scene/scene.h"
+#include "protocol/fnv.h"
 #include "protocol/memory.h"
 #include "renderer/pose/pose.h"
 #include <math.h>
@@ -32,17 +33,17 @@ static GLuint make_buffer(struct scene *s, const void *data, size_t bytes)
     return name;
 }
 
-static const struct psc_texture_ref *slot(const struct psc_material *m, int i)
+const struct psc_texture_ref *scene_slot(const struct psc_material *m, int unit)
 {
     const struct psc_texture_ref *slots[SCENE_UNITS] = {
         &m->base, &m->surface, &m->normal, &m->occlusion, &m->emission};
-    return slots[i];
+    return slots[unit];
 }
 
 static bool has_textures(const struct psc_material *m)
 {
     for (int i = 0; i < SCENE_UNITS; i++)
-        if (slot(m, i)->texture >= 0)
+        if (scene_slot(m, i)->texture >= 0)
             return true;
     return false;
 }
@@ -73,7 +74,7 @@ static void upload_materials(struct scene *s)
         r->specular[3] = m->glossiness;
         r->flags[0] = m->alpha_mode, r->flags[1] = m->flags;
         for (int k = 0; k < SCENE_UNITS; k++) {
-            const struct psc_texture_ref *ref = slot(m, k);
+            const struct psc_texture_ref *ref = scene_slot(m, k);
             if (ref->texture >= 0)
                 r->flags[2] |= 1u << k;
             r->flags[3] |= (ref->uv_set & 1) << k;
@@ -204,6 +205,29 @@ static uint64_t state_key(const struct scene *s, uint32_t instance)
            (uint64_t)textured << 37 | (textured ? material : material - material % WINDOW);
 }
 
+static bool is_power_of_two(uint32_t x)
+{
+    return !(x & (x - 1));
+}
+
+/* How the textures of a material are looked up; NULL: there are none. */
+static uint64_t lookup_key(const struct psc_scene *blob, const struct psc_material *material)
+{
+    uint64_t key = PEN_FNV_START;
+    for (int i = 0; i < SCENE_UNITS && material; i++) {
+        int32_t number = scene_slot(material, i)->texture;
+        key = pen_fnv(key, &i, sizeof i);
+        if (number < 0)
+            continue;
+        const struct psc_texture *t = &blob->textures[number];
+        const struct psc_image *image = &blob->images[t->image];
+        uint32_t of[] = {t->wrap_s, t->wrap_t, t->nearest, image->srgb, image->levels > 1,
+            is_power_of_two(image->width), is_power_of_two(image->height)};
+        key = pen_fnv(key, of, sizeof of);
+    }
+    return key;
+}
+
 struct sortable {
     uint64_t key;
     uint32_t instance;
@@ -249,6 +273,12 @@ static void make_groups(struct scene *s)
         s->groups[s->group_count - 1].count++;
     }
     free(sorted);
+    memset(&s->states, 0, sizeof s->states);
+    for (uint32_t g = 0; g < s->group_count; g++) {
+        struct scene_group *group = &s->groups[g];
+        const struct psc_material *m = &s->blob.materials[group->material];
+        group->state = gl_states_name(&s->states, lookup_key(&s->blob, group->textured ? m : NULL));
+    }
     s->command_count = meshlets < MOST_COMMANDS ? (uint32_t)meshlets + 1 : MOST_COMMANDS;
     s->command_room = pen_alloc(s->command_count, sizeof *s->command_room);
 }
@@ -441,120 +471,4 @@ bool scene_set_pose(struct scene *s, const struct pen_request *request, struct p
     changes |= pose_dress(s->poses, s->pose.variant);
     follow_pose(s, changes);
     return fits;
-}
-
-static void bind_textures(struct scene *s, uint32_t material)
-{
-    const struct psc_material *m = &s->blob.materials[material];
-    for (int i = 0; i < SCENE_UNITS; i++) {
-        int32_t texture = slot(m, i)->texture;
-        if (texture < 0)
-            continue;
-        gl.BindTextureUnit((GLuint)i, s->images[s->blob.textures[texture].image].name);
-        gl.BindSampler((GLuint)i, s->samplers[texture]);
-    }
-}
-
-/* Seen from inside, a closed surface shows its back. */
-static bool is_inside(const struct scene *s, const struct scene_group *g, const float eye[3])
-{
-    for (uint32_t i = 0; i < g->count; i++) {
-        const float(*b)[3] = s->instance_bounds[s->order[g->first + i]];
-        if (eye[0] >= b[0][0] && eye[0] <= b[1][0] && eye[1] >= b[0][1] && eye[1] <= b[1][1] &&
-            eye[2] >= b[0][2] && eye[2] <= b[1][2])
-            return true;
-    }
-    return false;
-}
-
-bool scene_culls_back(
-    const struct scene *s, const struct scene_group *group, const struct cull_view *view)
-{
-    if (view->faces == CULL_CLOSED)
-        return group->closed && (view->parallel || !is_inside(s, group, view->eye));
-    return view->faces == CULL_SINGLE_SIDED && !group->double_sided;
-}
-
-static bool needs_textures(const struct scene_pass *pass, const struct scene_group *group)
-{
-    return group->alpha || (pass->full && group->textured);
-}
-
-/* The commands of one group within a piece of a drawing. */
-struct run {
-    uint32_t group, first, count;
-    bool cull_back;
-};
-
-/* Fills the piece: what is to be drawn of each group. Returns the triangles. */
-static uint64_t gather(struct scene *s, const struct cull_view *view, const struct scene_pass *pass,
-    struct cull_piece *piece, struct run *runs, uint32_t *run_count)
-{
-    struct cull_list list = {&s->blob, s->meshlet_areas, s->command_room, 0, s->command_count, 1};
-    uint64_t triangles = 0;
-    piece->more = false;
-    for (; piece->group < s->group_count; piece->group++, piece->instance = 0) {
-        const struct scene_group *group = &s->groups[piece->group];
-        struct run *run = &runs[*run_count];
-        *run = (struct run){piece->group, list.count, 0, scene_culls_back(s, group, view)};
-        list.weight = needs_textures(pass, group) ? CULL_TEXTURED_WEIGHT : 1;
-        if (pass->blended && !group->blend)
-            continue;
-        for (; piece->instance < group->count && !piece->more; piece->instance++) {
-            uint32_t instance = s->order[group->first + piece->instance];
-            if (!pass->hidden || !pass->hidden[instance])
-                triangles += cull_instance(view, instance, run->cull_back, &list, piece);
-            if (piece->more)
-                break;
-        }
-        run->count = list.count - run->first;
-        *run_count += run->count > 0;
-        if (run->count && needs_textures(pass, group))
-            piece->work += CULL_STATE_WORK;
-        if (piece->more)
-            break;
-    }
-    return triangles;
-}
-
-uint64_t scene_draw(struct scene *s, const struct cull_view *view, const struct scene_pass *pass,
-    struct cull_piece *piece)
-{
-    uint32_t run_count = 0;
-    struct run *runs = pen_alloc_zero(s->group_count + 1, sizeof *runs);
-    uint64_t triangles = gather(s, view, pass, piece, runs, &run_count);
-    if (!run_count)
-        goto done;
-    const struct run *last = &runs[run_count - 1];
-    gl.NamedBufferData(s->commands,
-        (GLsizeiptr)((last->first + last->count) * sizeof *s->command_room), s->command_room,
-        GL_STREAM_DRAW);
-    gl.BindBuffer(GL_DRAW_INDIRECT_BUFFER, s->commands);
-    for (const struct run *run = runs; run <= last; run++) {
-        const struct scene_group *group = &s->groups[run->group];
-        bool textured = needs_textures(pass, group);
-        gl.UseProgram(textured ? pass->textured : pass->opaque);
-        gl.BindVertexArray(pass->full || textured ? s->full_array : s->depth_array);
-        if (pass->full || textured)
-            gl.BindBufferRange(GL_UNIFORM_BUFFER, UBO_MATERIALS, s->materials,
-                (GLintptr)(group->material * sizeof(struct material_record)),
-                sizeof(struct materials_block));
-        if (textured)
-            bind_textures(s, group->material);
-        if (run->cull_back)
-            gl.Enable(GL_CULL_FACE);
-        else
-            gl.Disable(GL_CULL_FACE);
-        gl.FrontFace(group->mirrored != pass->front_is_clockwise ? GL_CW : GL_CCW);
-        gl.MultiDrawElementsIndirect(GL_TRIANGLES, GL_UNSIGNED_INT,
-            (const void *)(uintptr_t)(run->first * sizeof *s->command_room), (GLsizei)run->count,
-            0);
-    }
-    gl.Disable(GL_CULL_FACE);
-    gl.FrontFace(GL_CCW);
-    for (GLuint i = 0; i < SCENE_UNITS; i++)
-        gl.BindSampler(i, 0);
-done:
-    free(runs);
-    return triangles;
 }

@@ -4,6 +4,7 @@
 #include "renderer/scene/cull.h"
 #include "renderer/scene/stage.h"
 #include "renderer/gl/program.h"
+#include "renderer/gl/states.h"
 #include "renderer/gl/texture.h"
 
 /* struct material_record, texture units of the geometry passes, locations of attributes */
@@ -17,6 +18,7 @@ struct scene_group {
     uint32_t first, count; /* of scene->order */
     uint32_t material;     /* first that is bound */
     bool textured;         /* with its textures; it is the only one */
+    uint32_t state;        /* of scene->states */
     bool double_sided, mirrored;
     bool closed; /* its surfaces are closed, face outwards and have no holes */
     bool alpha;  /* MASK or BLEND: fragments may be discarded */
@@ -52,6 +54,7 @@ struct scene {
     uint32_t *order;  /* instances sorted by state */
     struct scene_group *groups;
     uint32_t group_count;
+    struct gl_states states;
     struct cull_command *command_room;
     uint32_t command_count;         /* of one piece of a drawing at most */
     float *meshlet_areas;           /* see cull_list */
@@ -92,6 +95,9 @@ void scene_measure(struct scene *scene);
 float scene_floor(const struct scene *scene);
 /* The square that a ground is: centre x, height, centre z, half side. */
 void scene_ground(const struct scene *scene, float ground[4]);
+
+/* What a material has in one of the geometry passes' texture units. */
+const struct psc_texture_ref *scene_slot(const struct psc_material *material, int unit);
 
 bool scene_is_empty(const struct scene *scene);
 /* Of the sphere around the stage, m; >= 1e-9. Cameras and lights are chosen to suit it: a floor

@@ -1,5 +1,8 @@
-"""Blended surfaces that mean harm: values that no alpha can have, a thousand layers, a material for
-each of thousands of surfaces. What is drawn is right, and a picture's work stays bounded."""
+"""Surfaces that mean harm: values that no alpha can have, thousands of layers, a material for each
+of thousands of surfaces, textures looked up in thousands of ways. What is drawn is right, and a
+picture's work stays bounded."""
+import base64
+import itertools
 import math
 import struct
 import threading
@@ -119,7 +122,7 @@ class Blend(unittest.TestCase):
         self.assertLess(abs(sum(seen) / len(seen) - want), off)
 
     def test_many_layers(self):
-        """Through a hundred sheets comes what each leaves of the light, through four hundred nothing."""
+        """What each sheet leaves of the light comes through a hundred; nothing through 400."""
         for count, alpha in ((100, 0.01), (400, 0.04)):
             scene = self.stack(count, alpha, 1, extensions={"KHR_materials_unlit": {}})
             left = (1 - alpha) ** count
@@ -199,6 +202,29 @@ class Pile(unittest.TestCase):
         self.survives(self.d.upload(s.glb()), {
             "width": 900, "height": 700, "technique": {"name": "none"},
             "camera": {"eye": [0, 6, 0.01], "target": [0, 1, 0], "fov_y_deg": 30}})
+
+    def test_states(self):
+        """Each surface has its textures looked up in another way, for which drivers compile."""
+        s = self.few(0)
+        s.json["images"] = [{"uri": "data:image/png;base64," +
+                             base64.b64encode(harness.png(4, 4)).decode()}]
+        wraps = 33071, 33648, 10497
+        s.json["samplers"] = [
+            {"wrapS": u, "wrapT": v, "minFilter": low, "magFilter": high}
+            for u, v, low, high in itertools.product(wraps, wraps, range(9984, 9988), (9728, 9729))]
+        s.json["textures"] = [{"source": 0, "sampler": i} for i in range(len(s.json["samplers"]))]
+        uv = s.floats("VEC2", [[0, 0], [0, 1], [1, 1], [1, 0]])
+        for i, (a, b) in enumerate(itertools.product(range(len(s.json["textures"])), repeat=2)):
+            if i % 3:
+                continue
+            number = s.material([1, 1, 1, 1], "MASK", emissiveTexture={"index": b},
+                                emissiveFactor=[1, 1, 1])
+            s.json["materials"][number]["pbrMetallicRoughness"]["baseColorTexture"] = {"index": a}
+            s.sheet(2 - i / 5184, 1 + i / 5184, number)
+            s.json["meshes"][-1]["primitives"][0]["attributes"]["TEXCOORD_0"] = uv
+        self.survives(self.d.upload(s.glb()), {
+            "technique": {"name": "none"},
+            "camera": {"eye": [0, 6, 0.01], "target": [0, 1, 0], "fov_y_deg": 50}})
 
 
 if __name__ == "__main__":

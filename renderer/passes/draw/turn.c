@@ -127,14 +127,15 @@ static void learn(struct technique_ctx *ctx, struct pass_bands *bands)
     gl.Finish();
     double ms = fmax(gl_now_ms() - bands->since_ms, 1e-3), most_ms = ctx->turns.most_ms;
     struct cull_piece *piece = &bands->piece;
-    if (piece->work > LEAST_WORK) { /* what is less tells little */
+    bool first = bands->slowest_ms == 0;
+    if (!piece->compiles)
+        bands->slowest_ms = fmax(bands->slowest_ms, ms);
+    if (piece->work > LEAST_WORK && !piece->compiles) { /* what is less tells little */
         struct technique_speed *speed = pass_speed(ctx, bands->kind);
         speed->ms = fmax(ms / piece->work, REMEMBERED * speed->ms);
         piece->most = fmax(fmin(most_ms / speed->ms, 4 * piece->most), LEAST_WORK);
     }
-    bool first = bands->slowest_ms == 0;
-    bands->slowest_ms = fmax(bands->slowest_ms, ms);
-    if (piece->more)
+    if (piece->more || bands->slowest_ms == 0)
         return;
     /* Where there are several pieces, rows count only if one triangle is too much. */
     double fit = most_ms / bands->slowest_ms;

@@ -108,7 +108,8 @@ FAULTS = (  # and a word of the warning; None: it is not worth one
     (empty_primitive_beside, "is empty"), (sparse_indices, None))
 
 MATERIALS = ("KHR_materials_clearcoat", "KHR_materials_coat_of_tomorrow", "ADOBE_materials_thin",
-             "KHR_materials_transmission", "EXT_lights_image_based")
+             "KHR_materials_transmission", "EXT_lights_image_based", "GOOGLE_texture_basis",
+             "EXT_texture_jpegxl")
 SILENT = ("KHR_xmp", "KHR_xmp_json_ld", "EXT_mesh_features", "EXT_structural_metadata", "VRMC_vrm",
           "GODOT_single_root", "KHR_physics_rigid_bodies", "MSFT_packing_occlusionRoughnessMetallic")
 

@@ -202,7 +202,7 @@ static void formats(void)
     WebPFree(webp);
 
     r = one_image((struct bytes){(uint8_t *)"GIF89a..........", 16}, "image/gif", "\"source\":0");
-    CHECK(r.ok && has_warning(&r.scene, "The image is GIF, but neither PNG"));
+    CHECK(r.ok && has_warning(&r.scene, "The image is GIF; PNG"));
     imported_free(&r);
     r = one_image((struct bytes){(uint8_t *)"x", 1}, "image/ktx2",
         "\"extensions\":{\"KHR_texture_basisu\":{\"source\":0}}");

@@ -67,6 +67,7 @@ static const struct {
     {"VRMC_*", ""},
     {"*_materials_*", "is not supported: such materials are drawn as if they were without it"},
     {"*_lights_*", "is not supported: its lights are missing"},
+    {"*_texture_*", "is not supported: such textures are drawn by their fallbacks, or plain"},
 };
 
 /* The row's number, or -1. */

@@ -43,7 +43,9 @@ static const char *foreign(struct imp_bytes data)
         {"DDS", "DDS ", 0, 4}, {"AVIF", "ftypavif", 4, 8}, {"GIF", "GIF8", 0, 4},
         {"BMP", "BM", 0, 2}, {"TIFF", "II*", 0, 4}, {"TIFF", "MM\0*", 0, 4},
         {"Photoshop's", "8BPS", 0, 4}, {"OpenEXR", "v/1\1", 0, 4}, {"HDR", "#?", 0, 2},
-        {"JPEG XL", "\xff\x0a", 0, 2}, {"SVG", "<svg", 0, 4}};
+        {"JPEG XL", "\xff\x0a", 0, 2}, {"JPEG XL", "JXL ", 4, 4}, {"JPEG 2000", "jP  ", 4, 4},
+        {"HEIF", "ftyphei", 4, 7}, {"HEIF", "ftypmif1", 4, 8}, {"Basis", "sB", 0, 2},
+        {"SVG", "<svg", 0, 4}};
     for (size_t i = 0; i < sizeof kinds / sizeof *kinds; i++)
         if (data.bytes >= kinds[i].at + kinds[i].bytes &&
             !memcmp(data.data + kinds[i].at, kinds[i].magic, kinds[i].bytes))
@@ -67,7 +69,7 @@ bool imp_image_header(
         break;
     case IMP_UNKNOWN_IMAGE:
         return pen_fail(error, PEN_UNKNOWN_TYPE, "",
-            "The image is %s, but neither PNG nor JPEG nor WebP.", foreign(data));
+            "The image is %s; PNG, JPEG and WebP can be read.", foreign(data));
     }
     if (!read || !*width || !*height)
         return pen_fail(error, PEN_INVALID, "", "The image's header is damaged.");

@@ -1,15 +1,32 @@
 #include "renderer/gl/timer.h"
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 #include <time.h>
 
 #define ROOM (sizeof((struct gl_timer *)0)->passes / sizeof((struct gl_timer *)0)->passes[0])
 
-double gl_now_ms(void)
+static double read_clock(clockid_t clock)
 {
     struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
+    clock_gettime(clock, &t);
     return 1e3 * (double)t.tv_sec + 1e-6 * (double)t.tv_nsec;
+}
+
+double gl_now_ms(void)
+{
+    return read_clock(CLOCK_MONOTONIC);
+}
+
+struct gl_stopwatch gl_stopwatch_start(void)
+{
+    return (struct gl_stopwatch){gl_now_ms(), read_clock(CLOCK_PROCESS_CPUTIME_ID)};
+}
+
+double gl_stopwatch_ms(const struct gl_stopwatch *watch)
+{
+    double worked = read_clock(CLOCK_PROCESS_CPUTIME_ID) - watch->worked_ms;
+    return fmax(fmin(gl_now_ms() - watch->ms, worked), 1e-3);
 }
 
 void gl_timer_init(struct gl_timer *timer, bool software)

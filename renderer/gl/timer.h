@@ -37,3 +37,11 @@ void gl_timer_go_on(struct gl_timer *timer);
 void gl_timer_collect(struct gl_timer *timer, struct pen_result *result);
 
 double gl_now_ms(void); /* monotonic */
+
+/* How long work takes, for who cuts it: where other processes are on the processors too, not longer
+ * than what all threads of this one have worked. */
+struct gl_stopwatch {
+    double ms, worked_ms;
+};
+struct gl_stopwatch gl_stopwatch_start(void);
+double gl_stopwatch_ms(const struct gl_stopwatch *watch); /* above 0 */

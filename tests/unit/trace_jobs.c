@@ -462,7 +462,7 @@ static void test_turns(void)
     pen_trace_scene_destroy(scene);
     job.turn = guest_turn;
     job.turn_context = &guests;
-    job.turn_ms = 0.1;
+    job.turn_ms = 0.01;
     guests.scene = scene = ball_scene();
     run(scene, &light, &job, beside);
     CHECK(guests.jobs == 2 * TRACE_HIERARCHIES);

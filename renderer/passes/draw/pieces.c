@@ -49,7 +49,7 @@ void pass_pieces_begin(struct technique_ctx *ctx, struct pass_pieces *pieces, ui
 {
     *pieces = (struct pass_pieces){.width = width, .height = height, .kind = kind};
     pieces->columns = width, pieces->rows = height;
-    pieces->since_ms = gl_now_ms();
+    pieces->since = gl_stopwatch_start();
     if (pass_turn_is_whole(ctx))
         return;
     double known = ctx->software ? pass_speed(ctx, kind)->ms : 0;
@@ -73,7 +73,7 @@ static double learn(struct technique_ctx *ctx, const struct pass_pieces *p)
     if (!ctx->software)
         return PIXELS_ON_GPU;
     gl.Finish();
-    double ms = fmax(gl_now_ms() - p->since_ms, 1e-3);
+    double ms = gl_stopwatch_ms(&p->since);
     struct technique_speed *speed = pass_speed(ctx, p->kind);
     speed->ms = fmax(ms / pixels, REMEMBERED * speed->ms);
     return fmin(ctx->turns.most_ms / speed->ms, MOST_GROWTH * pixels);
@@ -101,7 +101,7 @@ bool pass_pieces_next(
     cut(p, pixels);
     if (!pass_turn(ctx, error))
         return false;
-    p->since_ms = gl_now_ms();
+    p->since = gl_stopwatch_start();
     return true;
 }
 

@@ -7,7 +7,7 @@ struct pass_pieces {
     uint32_t width, height;       /* px, of the pass */
     uint32_t x, y, columns, rows; /* the piece at hand: whole tiles (tiles.h) */
     uint64_t kind;
-    double since_ms;
+    struct gl_stopwatch since;
 };
 /* kind: of passes that take equally long for equal pixels. The first of its kind begins with a small
  * piece; what it was measured to take is kept with the context. */

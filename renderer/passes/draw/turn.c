@@ -102,7 +102,7 @@ static void begin_piece(struct pass_bands *bands)
 {
     bands->piece.pixels = (double)bands->rows * bands->width;
     bands->piece.work = 0;
-    bands->since_ms = gl_now_ms();
+    bands->since = gl_stopwatch_start();
 }
 
 void pass_bands_begin(struct technique_ctx *ctx, struct pass_bands *bands, uint32_t width,
@@ -125,7 +125,7 @@ void pass_bands_begin(struct technique_ctx *ctx, struct pass_bands *bands, uint3
 static void learn(struct technique_ctx *ctx, struct pass_bands *bands)
 {
     gl.Finish();
-    double ms = fmax(gl_now_ms() - bands->since_ms, 1e-3), most_ms = ctx->turns.most_ms;
+    double ms = gl_stopwatch_ms(&bands->since), most_ms = ctx->turns.most_ms;
     struct cull_piece *piece = &bands->piece;
     bool first = bands->slowest_ms == 0;
     if (!piece->compiles)

@@ -22,7 +22,7 @@ struct technique_speed *pass_speed(struct technique_ctx *ctx, uint64_t kind);
 struct pass_bands {
     uint32_t y, rows, height, width; /* px; the band at hand: y to y + rows */
     uint64_t kind;
-    double since_ms;
+    struct gl_stopwatch since;
     /* Of a drawing of triangles (scene_draw), that of the band which is at hand. */
     struct cull_piece piece;
     double slowest_ms; /* of the band's pieces so far */

@@ -84,7 +84,7 @@ bool pass_sample_views(struct technique_run *run, const struct sample_view *view
     uint32_t at_once = 1, drawn = 0;
     gl_timer_begin(&run->ctx->timer, PEN_STAGE_SHADOW, "sample maps");
     gl.CreateFramebuffers(1, &framebuffer);
-    double since_ms = gl_now_ms();
+    struct gl_stopwatch since = gl_stopwatch_start();
     for (uint32_t i = 0; ok && i < count; i++) {
         const struct sample_view *view = &views[i];
         gl.NamedFramebufferTextureLayer(
@@ -95,11 +95,11 @@ bool pass_sample_views(struct technique_run *run, const struct sample_view *view
             continue;
         if (run->ctx->software)
             gl.Finish();
-        double fit = drawn * run->ctx->turns.most_ms / fmax(gl_now_ms() - since_ms, 1e-3);
+        double fit = drawn * run->ctx->turns.most_ms / gl_stopwatch_ms(&since);
         at_once = (uint32_t)fmin(fmax(fit, 1), fmin(2 * at_once, MOST_AT_ONCE));
         drawn = 0;
         ok = pass_turn_inside(run->ctx, error);
-        since_ms = gl_now_ms();
+        since = gl_stopwatch_start();
     }
     gl.DeleteFramebuffers(1, &framebuffer);
     gl_timer_end(&run->ctx->timer);

@@ -412,14 +412,15 @@ static bool over_tiles(struct run *run, uint32_t threads,
     uint32_t piece = !job->turn ? run->tiles : known ? known : FIRST_TILES * threads;
     for (run->first_tile = 0; run->first_tile < run->tiles;) {
         uint32_t left = run->tiles - run->first_tile;
-        double start = trace_seconds();
+        double start = trace_seconds(), worked = *seconds;
         piece = piece < threads ? threads : piece;
         piece = piece < left ? piece : left;
         trace_parallel(threads, piece, work, run, seconds);
         run->first_tile += piece;
         if (!job->turn)
             continue;
-        double ms = 1e3 * (trace_seconds() - start);
+        /* Other processes may be on the processors, too. */
+        double ms = 1e3 * fmin(trace_seconds() - start, *seconds - worked);
         double most = (double)piece * MOST_GROWTH;
         double fit =
             samples ? next_piece(run, piece, samples, ms) : piece * job->turn_ms / fmax(ms, 1e-6);

@@ -218,7 +218,7 @@ static void lights(void)
         START "\"scenes\":[{\"nodes\":[0]}],\"nodes\":[{\"extensions\":{"
               "\"KHR_lights_punctual\":{\"light\":0}}}],\"extensions\":{\"KHR_lights_punctual\":{"
               "\"lights\":[{\"type\":\"point\"}]}}}"); /* the default is 1 cd */
-    CHECK(r.ok && has_warning(&r.scene, "only 1 cd"));
+    CHECK(r.ok && !has_warning(&r.scene, "cd"));
     CHECK(r.ok && fabs(r.scene.lights[0].light.power_w - 4 * M_PI / 683) < 1e-6);
     imported_free(&r);
 }

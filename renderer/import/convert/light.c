@@ -53,9 +53,10 @@ uint32_t imp_add_light(struct imp_context *context, const struct gltf_light *lig
         return IMP_SKIPPED;
     }
     imp_name(to.name, node->name, light->name);
-    if (light->intensity > context->brightest)
+    bool area = light->type == GLTF_LIGHT_RECT || light->type == GLTF_LIGHT_DISK;
+    if (!area && light->intensity > context->brightest)
         context->brightest = light->intensity;
-    if (light->intensity > 0 &&
+    if (!area && light->intensity > 0 &&
         (!context->dimmest.name[0] || light->intensity < context->dimmest.intensity)) {
         context->dimmest.intensity = light->intensity;
         context->dimmest.unit = light->type == GLTF_LIGHT_DIRECTIONAL ? "lux" : "cd";

@@ -196,7 +196,7 @@ static void choose_origin(const double min[3], const double max[3], double origi
         origin[k] = away > NEAR_RADII * radius ? nearbyint(origin[k] / step) * step : 0;
 }
 
-static void move_near(struct psc_primitive *p, struct geometry *g)
+static void move_near(struct psc_primitive *p, struct geometry *g, const float base[3])
 {
     double min[3], max[3], origin[3];
     for (int k = 0; k < 3; k++) {
@@ -211,6 +211,7 @@ static void move_near(struct psc_primitive *p, struct geometry *g)
         p->offset[k] = (float)origin[k];
         for (uint32_t i = 0; p->offset[k] != 0 && i < g->vertex_count; i++)
             g->positions[i][k] -= p->offset[k];
+        p->offset[k] += base[k];
     }
 }
 
@@ -226,7 +227,7 @@ static void remember(struct psc_builder *builder, uint32_t primitive, const stru
         made->points = pen_alloc_zero(made->point_count, sizeof *made->points);
         for (uint32_t i = 0; i < made->point_count; i++)
             for (int k = 0; k < 3; k++)
-                made->points[i][k] = mesh->points[i][k] - offset[k];
+                made->points[i][k] = mesh->points[i][k] - (offset[k] - mesh->base[k]);
     }
 }
 
@@ -246,7 +247,7 @@ static bool add_geometry(struct psc_builder *builder, const struct psc_mesh *mes
         .first_meshlet = (uint32_t)(s[PSC_MESHLETS].bytes / sizeof(struct psc_meshlet)),
         .material = mesh->material};
     if (near)
-        move_near(&p, &g);
+        move_near(&p, &g, mesh->base);
     for (uint32_t i = 0; i < g.vertex_count; i++)
         for (int k = 0; k < 3; k++) {
             float x = g.positions[i][k];

@@ -36,7 +36,8 @@ struct psc_mesh {
     uint32_t meshlet_count;
     const float (*points)[3]; /* what the mesh stands for, for the extent; NULL: its positions */
     uint32_t point_count;
-    bool closed; /* known to be of closed parts that face outwards; else that is found out */
+    float base[3]; /* that positions and points are relative to; 0 for psc_builder_add_deforming */
+    bool closed;   /* known to be of closed parts that face outwards; else that is found out */
 };
 
 /* Each returns the new item's number. Inputs are copied. */

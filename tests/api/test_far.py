@@ -1,9 +1,10 @@
 """The same thing far from the origin, or very small: the same picture as near it and in metres."""
+import random
 import unittest
 
 import harness
 from harness import Daemon
-from pictures import box, mesh_scene, off_by_more_than, rgb
+from pictures import box, mesh_scene, off_by_more_than, pose_files, rgb
 
 SIZE = {"width": 200, "height": 150}
 UTM = (500000.5, 250.0, -4649776.0)
@@ -92,6 +93,22 @@ class Far(unittest.TestCase):
                 scene = self.d.upload(mesh_scene(*stairs(offset)))
                 self.check_bounds(scene, offset)
                 self.same(scene, offset)
+
+    def test_points_and_lines_far_away(self):
+        """A scan in coordinates of a map: each point is smaller than a float resolves there."""
+        def scan(offset, mode):
+            rng, b = random.Random(4), pose_files.Builder()
+            places = [moved([rng.randint(-12, 12) / 2 for _ in range(3)], offset) for _ in range(60)]
+            b.json["meshes"] = [{"primitives": [
+                {"mode": mode, "attributes": {"POSITION": b.floats("VEC3", places)}}]}]
+            b.node(True, mesh=0)
+            return self.d.upload(b.glb())
+        for mode in (0, 1, 2, 3):
+            near = self.picture(scan((0, 0, 0), mode))
+            for offset in (UTM, ECEF):
+                with self.subTest(mode=mode, offset=offset):
+                    far = self.picture(scan(offset, mode))
+                    self.assertLessEqual(off_by_more_than(near, far, 8), MOST_OFF)
 
     def test_far_vertices_brought_back_by_the_node(self):
         scene = self.d.upload(mesh_scene(*stairs(UTM), node={"translation": [-x for x in UTM]}))

@@ -115,6 +115,32 @@ static void add_bar(
     }
 }
 
+#define NEAR_DIAGONALS 32
+
+/* Far from 0 floats are coarser than a point's size: places are made relative to one among them. */
+static void count_from_near(struct imp_geometry *g)
+{
+    double middle[3], away = 0, size = 0;
+    for (int k = 0; k < 3; k++) {
+        float least = g->positions[0][k], most = least;
+        for (uint32_t i = 1; i < g->vertex_count; i++) {
+            least = fminf(least, g->positions[i][k]);
+            most = fmaxf(most, g->positions[i][k]);
+        }
+        middle[k] = ((double)least + most) / 2;
+        away += middle[k] * middle[k];
+        size += ((double)most - least) * ((double)most - least);
+    }
+    if (!(away > NEAR_DIAGONALS * NEAR_DIAGONALS * size) || !(away > 1))
+        return;
+    double step = size > 0 ? exp2(floor(log2(sqrt(size)))) : 0; /* keeps differences exact */
+    for (int k = 0; k < 3; k++) {
+        g->base[k] = (float)(step > 0 ? nearbyint(middle[k] / step) * step : middle[k]);
+        for (uint32_t i = 0; i < g->vertex_count; i++)
+            g->positions[i][k] -= g->base[k];
+    }
+}
+
 static float diagonal(const struct imp_geometry *g)
 {
     double square = 0;
@@ -277,6 +303,7 @@ bool imp_marks_thicken(
     context->vertex_count += vertices;
     context->index_count += indices;
     imp_warn(context, "Points and lines are drawn as thin solids.");
+    count_from_near(g);
     struct solid s = {.g = {.positions = pen_alloc_zero((size_t)vertices, sizeof *s.g.positions),
                           .normals = pen_alloc_zero((size_t)vertices, sizeof *s.g.normals),
                           .indices = pen_alloc_zero((size_t)indices, sizeof *s.g.indices),
@@ -301,6 +328,7 @@ bool imp_marks_thicken(
     add_meshlets(&s.g, ball_triangles, 8);
     take_attributes(&s, g);
     free(s.from);
+    memcpy(s.g.base, g->base, sizeof s.g.base);
     s.g.points = g->positions;
     s.g.point_count = g->vertex_count;
     g->positions = NULL;

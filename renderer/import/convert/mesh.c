@@ -260,6 +260,7 @@ struct psc_mesh imp_geometry_mesh(
         .meshlet_count = g->meshlet_count,
         .points = (const float(*)[3])g->points,
         .point_count = g->point_count,
+        .base = {g->base[0], g->base[1], g->base[2]},
         .closed = g->closed};
 }
 
@@ -274,6 +275,8 @@ static bool add(struct imp_context *context, uint32_t number, struct imp_geometr
             bounds->min[k] = fminf(bounds->min[k], g->positions[i][k]);
             bounds->max[k] = fmaxf(bounds->max[k], g->positions[i][k]);
         }
+    for (int k = 0; k < 3; k++)
+        bounds->min[k] += g->base[k], bounds->max[k] += g->base[k];
     free(g->used); /* or no two vertices would be equal */
     g->used = NULL;
     imp_geometry_optimise(g, &context->optimiser_work);

@@ -16,3 +16,14 @@ void imp_geometry_finish(struct imp_geometry *g)
     free(g->points);
     memset(g, 0, sizeof *g);
 }
+
+void imp_geometry_from_zero(struct imp_geometry *g)
+{
+    for (int k = 0; k < 3; k++) {
+        for (uint32_t i = 0; i < g->vertex_count; i++)
+            g->positions[i][k] += g->base[k];
+        for (uint32_t i = 0; i < g->point_count; i++)
+            g->points[i][k] += g->base[k];
+        g->base[k] = 0;
+    }
+}

@@ -13,7 +13,8 @@ struct imp_geometry {
     uint32_t used_of;   /* how many the file's primitive has */
     float (*points)[3]; /* that the positions are solids around; NULL: they are none */
     uint32_t point_count;
-    bool closed; /* of solids that face outwards, as is known */
+    float base[3]; /* that positions and points are relative to: solids are small, far from 0 */
+    bool closed;   /* of solids that face outwards, as is known */
     uint32_t vertex_count;
     uint32_t *indices;
     uint32_t index_count;
@@ -22,6 +23,8 @@ struct imp_geometry {
 };
 
 void imp_geometry_finish(struct imp_geometry *geometry);
+/* Positions as the file has them, for what cannot be relative to anything. */
+void imp_geometry_from_zero(struct imp_geometry *geometry);
 
 /* optimise.c: welds equal vertices, orders triangles into meshlets of at most IMP_MESHLET_TRIANGLES
  * (compact ones with narrow normal cones, in an order kind to the vertex cache) and vertices by

@@ -380,6 +380,7 @@ bool imp_add_deforming(struct imp_context *context, uint32_t node, uint32_t numb
     }
     bool done = imp_geometry_read(context, number, &d.geometry, error);
     if (done && d.geometry.index_count) {
+        imp_geometry_from_zero(&d.geometry);
         imp_geometry_optimise(&d.geometry, &context->optimiser_work);
         done = (!added->skinned || read_influences(context, &d, primitive, error)) &&
                read_targets(context, &d, primitive, error) &&

@@ -5,6 +5,7 @@
 /* Beyond this slope from the axis a map has no useful resolution, and a Lambertian emitter little
  * light: tan 80 degrees. */
 #define MAX_SLOPE 5.67f
+#define MOST_MESHLETS 1000000u
 
 static void make_axes(
     const float direction[3], const float up[3], float x[3], float y[3], float z[3])
@@ -187,6 +188,15 @@ static void narrow_backdrop(
     range[1] = fminf(range[1], most);
 }
 
+/* Of all instances; more would take longer to look at than what they are worth. */
+static bool has_few_meshlets(const struct psc_scene *blob)
+{
+    uint64_t count = 0;
+    for (uint32_t i = 0; i < blob->instance_count && count <= MOST_MESHLETS; i++)
+        count += blob->primitives[blob->instances[i].primitive].meshlet_count;
+    return count <= MOST_MESHLETS;
+}
+
 /* Nearest and farthest z of what lies in front of the light: by instance box and by meshlet sphere,
  * whichever is tighter. A near plane that is too close widens every blocker search. A face of a
  * cube only owns receivers with |x|, |y| <= z, so what is nearer than |x| or |y| less the emitter's
@@ -201,6 +211,7 @@ static void geometry_range(const struct light_face *f, const struct light *light
         scene_instance_bounds(scene, i, min, max);
         alone = is_backdrop(scene, min, max, light->origin, sun);
     }
+    bool few = has_few_meshlets(&scene->blob);
     range[0] = INFINITY, range[1] = 0;
     for (uint32_t i = 0; i < scene->blob.instance_count; i++) {
         const struct psc_instance *instance = &scene->blob.instances[i];
@@ -213,17 +224,19 @@ static void geometry_range(const struct light_face *f, const struct light *light
         }
         if (!alone && !f->cube && is_backdrop(scene, bounds[0], bounds[1], light->origin, sun))
             narrow_backdrop(f, bounds, light->casters, box[2]);
-        for (uint32_t k = 0; k < p->meshlet_count; k++) {
+        for (uint32_t k = 0; k < (few || !p->meshlet_count ? p->meshlet_count : 1); k++) {
             const struct psc_meshlet *m = &scene->blob.meshlets[p->first_meshlet + k];
             float z = across(rows[2], m->center);
-            float near_z = fmaxf(z - scales[2] * m->radius, box[2][0]);
-            float far_z = fminf(z + scales[2] * m->radius, box[2][1]);
+            float near_z = few ? fmaxf(z - scales[2] * m->radius, box[2][0]) : box[2][0];
+            float far_z = few ? fminf(z + scales[2] * m->radius, box[2][1]) : box[2][1];
             if (far_z <= 0 || near_z > far_z)
                 continue;
             range[1] = fmaxf(range[1], far_z);
             for (int axis = 0; f->cube && axis < 2; axis++) {
-                float beside = fabsf(across(rows[axis], m->center)) - scales[axis] * m->radius;
-                beside = fmaxf(beside, fmaxf(box[axis][0], -box[axis][1]));
+                float beside = fmaxf(box[axis][0], -box[axis][1]);
+                if (few)
+                    beside = fmaxf(
+                        beside, fabsf(across(rows[axis], m->center)) - scales[axis] * m->radius);
                 near_z = fmaxf(near_z, beside - f->extent[axis]);
             }
             if (near_z <= far_z)

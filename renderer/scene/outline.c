@@ -6,6 +6,8 @@
  * vertex, which at these counts is far below a pixel. */
 #define MOST_VERTICES 200000u
 #define MOST_TRIANGLES 100000u
+/* And of all instances together. */
+#define MOST_PLACED 2000000u
 
 static void place(const struct psc_instance *instance, const float p[3], float world[3])
 {
@@ -41,10 +43,17 @@ void outline_grow(struct outline *o, const struct psc_scene *s, const float (*co
         if (!any)
             o->along[i] = -INFINITY;
     }
+    uint64_t placed = 0;
+    for (uint32_t n = 0; n < s->instance_count; n++)
+        placed += s->primitives[s->instances[n].primitive].vertex_count;
     uint32_t step = s->vertex_count / MOST_VERTICES + 1;
+    uint64_t apart = placed / step / MOST_PLACED * step + step;
     for (uint32_t n = 0; n < s->instance_count; n++) {
         const struct psc_primitive *p = &s->primitives[s->instances[n].primitive];
-        for (uint32_t v = 0; v < p->vertex_count; v += step) {
+        /* Of each instance others, where few are looked at. */
+        uint64_t first =
+            apart > step && p->vertex_count ? n * 7919ull % p->vertex_count % apart : 0;
+        for (uint64_t v = first; v < p->vertex_count; v += apart) {
             float at[3];
             place(&s->instances[n], s->positions[p->first_vertex + v], at);
             if (!is_inside(at, content))
@@ -90,11 +99,11 @@ static double walk(struct outline_samples *o, const struct psc_scene *s, const f
     double area = 0, next = 0.5 * stride;
     for (uint32_t n = 0; n < s->instance_count; n++) {
         const struct psc_primitive *p = &s->primitives[s->instances[n].primitive];
-        for (uint32_t i = 0; i + 2 < p->index_count; i += 3) {
+        uint64_t triangles = p->index_count / 3;
+        for (uint64_t i = (step - at % step) % step; i < triangles; i += step) {
             float center[3], normal[3];
-            if (at++ % step)
-                continue;
-            float one = area_normal(s, &s->instances[n], p->first_index + i, center, normal);
+            float one =
+                area_normal(s, &s->instances[n], p->first_index + 3 * (uint32_t)i, center, normal);
             if (!is_inside(center, content))
                 continue;
             area += one;
@@ -103,6 +112,7 @@ static double walk(struct outline_samples *o, const struct psc_scene *s, const f
                 memcpy(o->at[o->count++].normal, normal, sizeof normal);
             }
         }
+        at += triangles;
     }
     return area;
 }

@@ -147,12 +147,9 @@ struct pen_program_counts pen_renderer_programs(const struct pen_renderer *r)
     return gl_programs_counts(r->ctx.programs);
 }
 
-/* A frame in progress reads it, or one that is about to begin. */
-static bool is_used(const struct pen_renderer *r, const struct scene *scene)
+/* A frame in progress reads it. */
+static bool is_read(const struct pen_renderer *r, const struct scene *scene)
 {
-    for (uint32_t i = 0; r->admitting && i < r->admitting->count; i++)
-        if (!memcmp(r->admitting->ids[i], scene->id, PEN_ID_BYTES))
-            return true;
     for (uint32_t i = 0; i < PEN_MAX_RENDERS; i++) {
         const struct lane *lane = &r->renders[i].lane;
         if (!lane->busy)
@@ -166,6 +163,15 @@ static bool is_used(const struct pen_renderer *r, const struct scene *scene)
                 return true;
     }
     return false;
+}
+
+/* The same, or one that is about to begin will. */
+static bool is_used(const struct pen_renderer *r, const struct scene *scene)
+{
+    for (uint32_t i = 0; r->admitting && i < r->admitting->count; i++)
+        if (!memcmp(r->admitting->ids[i], scene->id, PEN_ID_BYTES))
+            return true;
+    return is_read(r, scene);
 }
 
 static void remove_scene(struct pen_renderer *r, uint32_t i)
@@ -186,7 +192,7 @@ static bool is_any_busy(const struct pen_renderer *r)
 }
 
 /* Frees something that can be made again, the cheapest first: sums that somebody may ask more of,
- * targets that nobody draws into, shadow inputs, sessions, emission textures, scenes. False: all that is left is in use. */
+ * targets that nobody draws into, shadow inputs, sessions, emission textures, scenes, hierarchies for rays. False: all that is left is in use. */
 static bool evict(struct pen_renderer *r, uint64_t bytes, const struct scene *keep)
 {
     uint64_t least = UINT64_MAX, before = kept_sums_store_bytes(r->ctx.kept_sums);
@@ -215,10 +221,14 @@ static bool evict(struct pen_renderer *r, uint64_t bytes, const struct scene *ke
     for (uint32_t i = 0; i < r->scene_count; i++)
         if (r->scenes[i] != keep && r->scenes[i]->last_use < least && !is_used(r, r->scenes[i]))
             least = r->scenes[i]->last_use, oldest = i;
-    if (oldest == UINT32_MAX)
-        return false;
-    remove_scene(r, oldest);
-    return true;
+    if (oldest != UINT32_MAX) {
+        remove_scene(r, oldest);
+        return true;
+    }
+    for (uint32_t i = 0; i < r->scene_count; i++)
+        if (!is_read(r, r->scenes[i]) && scene_shed(r->scenes[i]))
+            return true;
+    return false;
 }
 
 /* Evicts until the budget holds with so many bytes more. `keep` stays whatever happens. */
@@ -376,9 +386,10 @@ enum pen_admission pen_renderer_admit(struct pen_renderer *r, const struct pen_r
     if (!free_render(r) || (scene && !can_pose(r, scene, request)) || is_session_busy(r, request))
         return PEN_LATER;
     r->admitting = blobs;
-    /* Nothing is loaded in vain while others are there. */
+    /* Room first, so that old and new are never there together; and nothing is loaded in vain while
+     * others are there. */
     uint64_t more = blob_bytes(r, blobs, false) + picture_bytes(r, request);
-    if (!alone && !make_room(r, more, NULL))
+    if (!make_room(r, more, NULL) && !alone)
         goto done;
     if (!load_blobs(r, blobs, error)) {
         admission = PEN_REFUSED;
@@ -424,6 +435,10 @@ struct pen_render *pen_render_begin(struct pen_renderer *r, const struct pen_req
     while (strcmp(technique_registry[t]->info.name, request->technique))
         t++;
     scene->last_use = ++r->clock;
+    for (uint32_t i = 0; i < r->scene_count; i++)
+        if (r->scenes[i] != scene && !is_used(r, r->scenes[i]))
+            scene_rest(r->scenes[i]);
+    scene->rests = false;
     if (!scene_set_pose(scene, request, error))
         goto fail;
     struct lane *lane = &render->lane;

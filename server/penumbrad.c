@@ -58,9 +58,14 @@ int main(int argc, char **argv)
         return EXIT_SETTINGS;
     }
     log_init(config.log_format.index);
-    /* For the workers: on a software device textures are cleared memory, and to get that in large
-     * pages takes a fifth of the time. */
-    setenv("GLIBC_TUNABLES", "glibc.malloc.hugetlb=1", 0);
+    /* For the workers. On a software device textures are cleared memory, and to get that in large
+     * pages takes a fifth of the time. Given back it leaves the process, whatever its size was: else
+     * a large one that has gone makes glibc keep what comes later. */
+    setenv("GLIBC_TUNABLES",
+        "glibc.malloc.hugetlb=1:glibc.malloc.mmap_threshold=262144:"
+        "glibc.malloc.trim_threshold=4194304:glibc.malloc.mmap_max=1000000:"
+        "glibc.malloc.arena_max=4",
+        0);
     static sigset_t signals;
     sigemptyset(&signals);
     sigaddset(&signals, SIGTERM);

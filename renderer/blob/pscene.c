@@ -241,6 +241,12 @@ bool psc_open(int fd, struct psc_scene *scene, struct pen_error *error)
     return true;
 }
 
+void psc_rest(const struct psc_scene *scene)
+{
+    if (scene->map_bytes)
+        madvise((void *)scene->header, scene->map_bytes, MADV_DONTNEED);
+}
+
 void psc_close(struct psc_scene *scene)
 {
     if (scene->map_bytes)

@@ -180,3 +180,6 @@ bool psc_open_memory(
     const void *data, size_t bytes, struct psc_scene *scene, struct pen_error *error);
 /* Unmaps what psc_open mapped; harmless on a zeroed or psc_open_memory scene. */
 void psc_close(struct psc_scene *scene);
+/* Gives back the memory that reading what psc_open mapped has taken: it is read again where it is
+ * needed. */
+void psc_rest(const struct psc_scene *scene);

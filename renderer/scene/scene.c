@@ -9,6 +9,8 @@
 /* Materials that are bound together. */
 #define WINDOW (sizeof(struct materials_block) / sizeof(struct material_record))
 #define MOST_COMMANDS (1u << 18) /* at once */
+/* Of an image file's texels, mapped and uploaded. */
+#define MOST_READ (16u << 20)
 
 /* Instance attribute: three matrix rows and the material, 64 bytes. */
 struct instance_record {
@@ -101,6 +103,7 @@ static void upload_instances(struct scene *s)
 
 static void upload_images(struct scene *s)
 {
+    uint64_t read = 0;
     s->images = pen_alloc_zero(s->blob.image_count + 1, sizeof *s->images);
     s->samplers = pen_alloc_zero(s->blob.texture_count + 1, sizeof *s->samplers);
     for (uint32_t i = 0; i < s->blob.image_count; i++) {
@@ -116,6 +119,11 @@ static void upload_images(struct scene *s)
             texels += (size_t)4 * w * h;
         }
         s->bytes += s->images[i].bytes;
+        read += s->images[i].bytes;
+        if (read > MOST_READ) { /* not file and texture both, of all images at a time */
+            psc_rest(&s->file);
+            read = 0;
+        }
     }
     static const GLint wraps[] = {GL_REPEAT, GL_CLAMP_TO_EDGE, GL_MIRRORED_REPEAT};
     for (uint32_t i = 0; i < s->blob.texture_count; i++) {
@@ -310,6 +318,7 @@ static struct scene *upload(struct scene *s, struct pen_error *error)
     find_kinds(s);
     gl.CreateBuffers(1, &s->commands);
     scene_measure(s);
+    psc_rest(&s->file);
     if (gl.GetError() != GL_NO_ERROR) {
         pen_fail(error, PEN_INTERNAL, "", "The GPU has no memory left for this scene.");
         scene_destroy(s);
@@ -353,11 +362,25 @@ struct scene *scene_create(const uint8_t id[PEN_ID_BYTES], int fd, struct pen_er
     return NULL;
 }
 
+void scene_rest(struct scene *scene)
+{
+    if (!scene->rests)
+        psc_rest(&scene->file);
+    scene->rests = true;
+}
+
 void scene_attach(struct scene *scene, struct scene_attachment *attachment)
 {
     attachment->next = scene->attachments;
     scene->attachments = attachment;
     scene->bytes += attachment->bytes;
+}
+
+void scene_attachment_resize(
+    struct scene *scene, struct scene_attachment *attachment, uint64_t bytes)
+{
+    scene->bytes += bytes - attachment->bytes;
+    attachment->bytes = bytes;
 }
 
 struct scene_attachment *scene_attachment(
@@ -385,12 +408,19 @@ void scene_detach(struct scene *scene, struct scene_attachment *attachment)
     remove_attachment(scene, at);
 }
 
+bool scene_shed(struct scene *scene)
+{
+    bool any = scene->attachments;
+    while (scene->attachments)
+        remove_attachment(scene, &scene->attachments);
+    return any;
+}
+
 void scene_destroy(struct scene *s)
 {
     if (!s)
         return;
-    while (s->attachments)
-        remove_attachment(s, &s->attachments);
+    scene_shed(s);
     GLuint buffers[] = {
         s->positions, s->attributes, s->indices, s->instances, s->materials, s->commands};
     gl.DeleteBuffers(sizeof buffers / sizeof *buffers, buffers);

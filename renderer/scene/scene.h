@@ -68,6 +68,7 @@ struct scene {
     bool has_gloss; /* some roughness is below 0.5 */
     uint64_t bytes;
     uint64_t last_use;
+    bool rests; /* what is mapped of its file takes no memory */
     struct scene_attachment *attachments;
     uint32_t moved;  /* counts the poses that put vertices or instances elsewhere */
     uint32_t remade; /* counts those with other instances, or other alpha */
@@ -76,12 +77,18 @@ struct scene {
 /* Uploads the blob behind `fd`. Errors as psc_open; PEN_INTERNAL out of GPU memory. */
 struct scene *scene_create(const uint8_t id[PEN_ID_BYTES], int fd, struct pen_error *error);
 void scene_destroy(struct scene *scene);
+/* Its file is read no more for a while. */
+void scene_rest(struct scene *scene);
 
 void scene_attach(struct scene *scene, struct scene_attachment *attachment);
+/* It has become larger or smaller. */
+void scene_attachment_resize(
+    struct scene *scene, struct scene_attachment *attachment, uint64_t bytes);
 /* The one that ends with `destroy`; NULL: none. */
 struct scene_attachment *scene_attachment(
     const struct scene *scene, void (*destroy)(struct scene_attachment *attachment));
 void scene_detach(struct scene *scene, struct scene_attachment *attachment); /* and destroys it */
+bool scene_shed(struct scene *scene); /* detaches all; false: there is none */
 
 /* Poses it by the request's animation ("": at rest; see pose_find), held within the animation's time,
  * and dresses it in the request's variant.

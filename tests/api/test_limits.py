@@ -1,18 +1,37 @@
 """Full queues, used-up shares, deadlines, sharing, caches, budgets: what the service does when asked
 for more than it has."""
+import base64
 import json
 import os
+import re
 import shutil
 import ssl
+import struct
 import subprocess
 import tempfile
 import threading
 import time
 import unittest
 import urllib.request
+import zlib
 
 import harness
+from pictures import chunk, mesh_scene
 from harness import HEAVY, IN_TURNS, PATIENCE, SMALL, Daemon, grid_scene, wait
+
+
+def textured_scene(side, seed):
+    """A square under three textures of side x side; each takes 16 / 3 side^2 bytes of memory."""
+    slots = ("baseColorTexture", "metallicRoughnessTexture")
+    head = chunk(b"IHDR", struct.pack(">IIBBBBB", side, side, 8, 2, 0, 0, 0))
+    images = [b"\x89PNG\r\n\x1a\n" + head + chunk(b"IDAT", zlib.compress(
+        (b"\0" + bytes((seed, 40 * i, 200)) * side) * side, 1)) + chunk(b"IEND", b"") for i in range(3)]
+    uris = ["data:image/png;base64," + base64.b64encode(i).decode() for i in images]
+    return mesh_scene([(x, 0.5, z) for x in (-1, 1) for z in (-1, 1)], [(0, 1, 0)] * 4,
+                      [0, 1, 2, 2, 1, 3], material={
+        "pbrMetallicRoughness": {slot: {"index": i} for i, slot in enumerate(slots)},
+        "emissiveTexture": {"index": 2}, "emissiveFactor": [1, 1, 1]},
+        images=[{"uri": u} for u in uris], textures=[{"source": i} for i in range(3)])
 
 
 class Crowd:
@@ -185,6 +204,21 @@ class Limits(unittest.TestCase):
         whole = self.daemon("--gpu-memory=1M")
         scene = whole.upload(grid_scene(300, "never fits"))
         self.assertEqual(whole.render(scene, SMALL).status, 413)
+
+    def test_memory_follows_the_budget(self):
+        """Of the worker's process, the driver's part and mapped files included, at its peak."""
+        budget, room = 160, 150  # MiB
+        d = self.daemon("--gpu-memory=%dM" % budget)
+        d.worker()
+        if not d.get("/v1").json()["device"]["software"]:
+            self.skipTest("the budget is of the GPU's memory here")
+        scenes = [d.upload(textured_scene(2048, n)) for n in range(5)]
+        for scene in scenes + scenes[:2]:
+            self.assertEqual(d.render(scene, SMALL).status, 200)
+            self.assertEqual(d.render(scene, {**SMALL, "technique": "raytraced"}).status, 200)
+        with open("/proc/%d/status" % d.worker()) as status:
+            peak = int(re.search(r"VmHWM:\s*(\d+) kB", status.read())[1]) >> 10
+        self.assertLess(peak, budget + room)
 
     def test_result_cache_is_bounded(self):
         d = self.daemon("--result-cache=300K")

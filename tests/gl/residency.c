@@ -138,6 +138,37 @@ static void check_hierarchy(void)
     pen_renderer_destroy(r);
 }
 
+/* Embree's hierarchy, where the processor's memory is what OpenGL has, too: it counts, and makes
+ * room for a picture that would be refused beside it. */
+static void check_host_hierarchy(void)
+{
+    enum { TRIANGLES = 50000 };
+    struct pen_error error = {0};
+    struct pen_renderer *r = fixture_renderer(PEN_DEVICE_AUTO, 0, &error);
+    uint8_t id[PEN_ID_BYTES];
+    struct pen_request request;
+    struct pen_result result;
+    fixture_scene(r, PEN_GENERATED_HAIRBALL, TRIANGLES, 1, id);
+    uint64_t before = pen_renderer_gpu_bytes(r);
+    traced_request(&request, id);
+    set_param(&request, "backend", 2); /* cpu */
+    fixture_render(r, &request, &result);
+    uint64_t hierarchy = pen_renderer_gpu_bytes(r) - before;
+    bool software = result.device.software;
+    pen_renderer_destroy(r);
+    if (!software)
+        return;
+    CHECK(hierarchy > TRIANGLES * 48 && hierarchy < TRIANGLES * 1000);
+    r = fixture_renderer(PEN_DEVICE_AUTO, before + hierarchy + (1 << 20), &error);
+    fixture_scene(r, PEN_GENERATED_HAIRBALL, TRIANGLES, 1, id);
+    fixture_render(r, &request, &result);
+    fixture_request(&request, id, "hard"); /* takes more than the MiB that is left */
+    const struct pen_blobs loaded = {.count = 1, .ids = {id}, .fds = {-1}};
+    CHECK(pen_renderer_admit(r, &request, &loaded, &error) == PEN_ADMITTED);
+    CHECK(pen_renderer_gpu_bytes(r) < before + hierarchy);
+    pen_renderer_destroy(r);
+}
+
 int main(void)
 {
     struct pen_error error;
@@ -152,5 +183,6 @@ int main(void)
     pen_renderer_destroy(r);
     check_eviction();
     check_hierarchy();
+    check_host_hierarchy();
     CHECK_DONE();
 }

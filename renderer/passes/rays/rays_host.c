@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Embree's scene, in the processor's memory. */
+/* Embree's scene, in the processor's memory: where that is what OpenGL has, too, it counts. */
 struct host_scene {
     struct scene_attachment attachment;
     struct pen_trace_scene *trace;
@@ -23,8 +23,11 @@ static void destroy(struct scene_attachment *attachment)
     free(s);
 }
 
-static struct pen_trace_scene *trace_scene(struct scene *scene, struct pen_error *error)
+static struct pen_trace_scene *trace_scene(const struct technique_run *run, struct pen_error *error)
 {
+    struct scene *scene = run->scene;
+    struct pen_trace_scene_options options = {
+        .max_bytes = run->ctx->software ? run->ctx->gpu_memory : 0};
     struct scene_attachment *known = scene_attachment(scene, destroy);
     if (known) {
         struct host_scene *s = container_of(known, struct host_scene, attachment);
@@ -32,7 +35,7 @@ static struct pen_trace_scene *trace_scene(struct scene *scene, struct pen_error
             return s->trace;
         scene_detach(scene, known);
     }
-    struct pen_trace_scene *trace = pen_trace_scene_create(&scene->blob, NULL, error);
+    struct pen_trace_scene *trace = pen_trace_scene_create(&scene->blob, &options, error);
     if (!trace)
         return NULL;
     struct host_scene *s = pen_alloc_zero(1, sizeof *s);
@@ -42,6 +45,13 @@ static struct pen_trace_scene *trace_scene(struct scene *scene, struct pen_error
     s->remade = scene->remade;
     scene_attach(scene, &s->attachment);
     return trace;
+}
+
+static void count_memory(const struct technique_run *run, const struct pen_trace_scene *trace)
+{
+    if (run->ctx->software)
+        scene_attachment_resize(
+            run->scene, scene_attachment(run->scene, destroy), pen_trace_scene_info(trace).bytes);
 }
 
 /* The emission texture as floats; freed by the caller. */
@@ -137,7 +147,7 @@ static struct kept_sum *open_kept(struct technique_run *run, const struct ray_jo
 bool pass_rays_host(struct technique_run *run, const struct ray_job *job, struct ray_targets *t,
     struct pen_error *error)
 {
-    struct pen_trace_scene *scene = trace_scene(run->scene, error);
+    struct pen_trace_scene *scene = trace_scene(run, error);
     if (!scene || !ray_receivers(run, t, error))
         return false;
     size_t count = (size_t)run->width * run->height;
@@ -184,6 +194,7 @@ bool pass_rays_host(struct technique_run *run, const struct ray_job *job, struct
     gl_timer_begin(&run->ctx->timer, PEN_STAGE_TECHNIQUE, "trace");
     bool ok = pen_trace_visibility(scene, &light, &trace, &result, &stats, error);
     gl_timer_end(&run->ctx->timer);
+    count_memory(run, scene);
     if (kept) {
         kept->own = gathered;
         kept->samples = pen_trace_kept_samples(gathered);

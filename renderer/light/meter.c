@@ -50,7 +50,7 @@ static int ascending(const void *a, const void *b)
 }
 
 /* What four fifths of the irradiances stay below that are not next to nothing (outside a cone, behind
- * an emitter), and half of it more; 0 where no light reaches anything. */
+ * an emitter), and a third more; 0 where no light reaches anything. */
 static float level_of(float *found, uint32_t count)
 {
     uint32_t dark = 0;
@@ -60,7 +60,7 @@ static float level_of(float *found, uint32_t count)
         return 0;
     while (found[dark] < 1e-3f * most)
         dark++;
-    return 1.5f * found[dark + (count - dark - 1) * 4 / 5] / GLM_PIf;
+    return 4.0f / 3 * found[dark + (count - dark - 1) * 4 / 5] / GLM_PIf;
 }
 
 /* The sides that turn away from a lamp are not lit, and must not count; but in many files the sign
@@ -96,7 +96,7 @@ float light_meter(
 }
 
 /* What own lights leave in the dark is more of the picture than behind a key light. */
-#define FILL 1.15f
+#define FILL 1.04f
 
 /* What faces the lights squarely comes out just below white, with the sky's share on top. The key
  * light is made to measure: its level is 1. */

@@ -266,8 +266,6 @@ class FirstSight(unittest.TestCase):
                 ({"type": "point", "intensity": 5}, {"translation": [0, 0.2, 0.9]}),
                 ({"type": "point", "intensity": 80}, {"translation": [0, 3, 0]}),
                 ({"type": "directional", "intensity": 3}, {"rotation": [-0.5 ** 0.5, 0, 0, 0.5 ** 0.5]}),
-                ({"type": "spot", "intensity": 5, "spot": {"outerConeAngle": 0.08}},
-                 {"translation": [0, 0.5, 3], "rotation": [-0.0785, 0, 0, 0.9969]}),
                 ({"type": "spot", "intensity": 80, "spot": {"outerConeAngle": 0.9}},
                  {"translation": [0.5, 2.5, 0.5], "rotation": [-0.68, 0.1, 0.1, 0.72]})):
             mean = self.lit_mean(light, node)

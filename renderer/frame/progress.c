@@ -76,6 +76,11 @@ static float combine(const struct frame_progress *p)
     return worst > 0 ? (float)sqrt(sum) : -1;
 }
 
+static bool has_error(const struct frame_progress *p)
+{
+    return are_apart(p) ? combine(p) >= 0 : p->standard_error >= 0;
+}
+
 /* An estimate of so many samples in all. */
 static enum technique_step step(struct frame_progress *p, uint32_t samples)
 {
@@ -92,7 +97,8 @@ static enum technique_step step(struct frame_progress *p, uint32_t samples)
     double share = fmax(viewer->share, LEAST_SHARE);
     /* More at the beginning, when there is most to see; in the end it is the share of all. */
     share *= sqrt((double)p->total * p->job->request->antialias / samples);
-    if (!first && p->extra_ms + p->last_extra_ms > share * now)
+    bool owes = p->tracked && !has_error(p); /* however quick the samples are */
+    if (!first && !owes && p->extra_ms + p->last_extra_ms > share * now)
         return STEP_GO_ON;
     p->show_wanted = viewer->wants && viewer->wants(viewer->context);
     bool more = are_apart(p) ? p->kept_unit != p->unit || p->own >= 2 * p->kept_own

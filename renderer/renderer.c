@@ -38,6 +38,13 @@ struct pen_renderer {
     const struct pen_blobs *admitting; /* not evicted now */
 };
 
+static bool make_room(struct pen_renderer *r, uint64_t more, const struct scene *keep);
+
+static void make_room_in_frame(void *owner, uint64_t bytes)
+{
+    make_room(owner, bytes, NULL);
+}
+
 struct pen_renderer *pen_renderer_create(
     const struct pen_renderer_config *config, struct pen_error *error)
 {
@@ -53,6 +60,8 @@ struct pen_renderer *pen_renderer_create(
     r->ctx.software = r->device.software;
     r->ctx.is_called = config->is_called;
     r->ctx.call_context = config->call_context;
+    r->ctx.make_room = make_room_in_frame;
+    r->ctx.room_owner = r;
     r->ctx.programs = gl_programs_create(config->programs);
     r->ctx.speeds = r->speeds;
     r->ctx.shadows = shadow_cache_create();

@@ -3,6 +3,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#define FIRST_TEXEL_BYTES 8 /* of a kind that none is there of: depth, and something beside it */
+
 /* What of a face and a request changes a shadow input: everything but the view and the emission. */
 struct face_key {
     mat4 world_to_light;
@@ -72,6 +74,15 @@ static void use(struct shadow_cache *cache, struct entry *e, uint32_t lane)
     e->lanes |= 1u << lane;
 }
 
+/* What one is about to take: as much as the last of its kind and size. */
+static uint64_t expected_bytes(const struct shadow_cache *cache, const struct shadow_key *key)
+{
+    for (const struct entry *e = cache->entries; e; e = e->next)
+        if (e->key.size == key->size && !strcmp(e->key.kind, key->kind))
+            return e->bytes;
+    return (uint64_t)key->size * key->size * FIRST_TEXEL_BYTES;
+}
+
 const struct shadow_input *shadow_cache_get(struct technique_run *run, const struct shadow_key *key,
     shadow_build build, struct pen_error *error)
 {
@@ -86,6 +97,8 @@ const struct shadow_input *shadow_cache_get(struct technique_run *run, const str
             use(cache, e, run->ctx->lane);
             return &e->input;
         }
+    if (run->ctx->make_room)
+        run->ctx->make_room(run->ctx->room_owner, expected_bytes(cache, key));
     struct entry *e = pen_alloc_zero(1, sizeof *e);
     e->scene = run->scene;
     e->pose = run->scene->pose;

@@ -41,14 +41,18 @@ static enum pen_admission admit(struct pen_renderer *r, const struct pen_request
     return pen_renderer_admit(r, request, &wanted, error);
 }
 
-static void make_request(struct pen_request *request, int blob)
+static void make_request_of(struct pen_request *request, int blob, double texels)
 {
     fixture_request(request, blobs.ids[blob], "pcf");
-    double texels = 64; /* so that shadow inputs hardly count */
     const struct pen_technique_info *info = pen_catalogue_find(pen_renderer_catalogue(), "pcf");
     pen_param_store(
         pen_param_find(info->params, "map_size"), request->technique_params, &texels, "", NULL);
     request->width = 80, request->height = 60;
+}
+
+static void make_request(struct pen_request *request, int blob)
+{
+    make_request_of(request, blob, 64); /* so that shadow inputs hardly count */
 }
 
 /* One that has begun and has its first turn. */
@@ -150,6 +154,46 @@ static void check_pictures(uint64_t blob)
     pen_renderer_destroy(r);
 }
 
+/* The light follows the camera: each picture needs a map of its own. */
+static void turn_camera(struct pen_request *request, int step)
+{
+    request->camera.mode = PEN_CAMERA_ORBIT;
+    request->camera.azimuth_deg = 40 * (float)step;
+}
+
+/* There is room for two maps and a half: the third frame's takes the place of the first's when it is
+ * drawn, not when the frame has ended. */
+static void check_maps_within_a_frame(void)
+{
+    struct pen_error error;
+    struct pen_renderer *r = fixture_renderer(PEN_DEVICE_AUTO, 0, &error);
+    struct progress frame = {0};
+    struct pen_result result;
+    uint64_t bytes[2];
+    make_request_of(&frame.request, IN_USE, 2048);
+    CHECK(admit(r, &frame.request, IN_USE, false, &error) == PEN_ADMITTED);
+    for (int i = 0; i < 2; i++) {
+        turn_camera(&frame.request, i);
+        fixture_render(r, &frame.request, &result);
+        bytes[i] = pen_renderer_gpu_bytes(r);
+    }
+    pen_renderer_destroy(r);
+    uint64_t map = bytes[1] - bytes[0], budget = bytes[1] + map / 2;
+    CHECK(map >= 2048 * 2048 * 4);
+    r = fixture_renderer(PEN_DEVICE_AUTO, budget, &error);
+    for (int i = 0; i < 4; i++) {
+        turn_camera(&frame.request, i);
+        CHECK(admit(r, &frame.request, IN_USE, false, &error) == PEN_ADMITTED);
+        frame.render = pen_render_begin(r, &frame.request, &frame.frame, &frame.result, &error);
+        CHECK(frame.render);
+        while (frame.render && !pen_render_advance(frame.render, 0))
+            CHECK(pen_renderer_gpu_bytes(r) <= budget);
+        CHECK(pen_render_end(frame.render, NULL));
+        pen_frame_finish(&frame.frame);
+    }
+    pen_renderer_destroy(r);
+}
+
 int main(void)
 {
     struct pen_error error;
@@ -162,6 +206,7 @@ int main(void)
     CHECK(blob > 1 << 20);
     check_scenes_in_use(blob);
     check_pictures(blob);
+    check_maps_within_a_frame();
     for (uint32_t i = 0; i < BLOBS; i++)
         close(blobs.fds[i]);
     CHECK_DONE();

@@ -2,6 +2,7 @@
 #pragma once
 #include "renderer/blob/builder.h"
 #include "tests/unit/check.h"
+#include "tests/unit/random.h"
 
 static const float cube_positions[8][3] = {{-1, -1, -1}, {1, -1, -1}, {1, 1, -1}, {-1, 1, -1},
     {-1, -1, 1}, {1, -1, 1}, {1, 1, 1}, {-1, 1, 1}};
@@ -14,17 +15,6 @@ static inline struct psc_mesh cube_mesh(void)
 {
     return (struct psc_mesh){
         .positions = cube_positions, .vertex_count = 8, .indices = cube_indices, .index_count = 36};
-}
-
-static inline uint32_t next_random(uint64_t *state)
-{
-    *state = *state * 6364136223846793005u + 1442695040888963407u;
-    return (uint32_t)(*state >> 33) << 1 ^ (uint32_t)(*state >> 20);
-}
-
-static inline double uniform(uint64_t *state, double low, double high)
-{
-    return low + (high - low) * next_random(state) / 4294967296.0;
 }
 
 /* Adds one instance of `mesh`, finishes and opens; aborts the test on failure. */

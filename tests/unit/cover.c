@@ -3,6 +3,7 @@
  * or not, turned away or not, half of them with holes that a texture cuts. */
 #include "renderer/scene/cover.h"
 #include "tests/unit/check.h"
+#include "tests/unit/random.h"
 #include <cglm/cglm.h>
 
 enum { TRIANGLES = 40, WIDTH = 83, HEIGHT = 62, ACROSS = 21, DOWN = 16, FIRST = 8, ROWS = 40 };
@@ -11,28 +12,22 @@ enum { ROUNDS = 100, CORNERS = 3 * TRIANGLES, TEXELS = 4 };
 static const double near_z = 0.05;
 static uint64_t state = 5;
 
-static double uniform(double low, double high)
-{
-    state = state * 6364136223846793005u + 1442695040888963407u;
-    return low + (high - low) * (double)(state >> 11) / 9007199254740992.0;
-}
-
 /* Reversed depth without a far plane. */
 static void make_view(struct cull_view *view)
 {
     vec3 target;
     mat4 look, lens;
     for (int k = 0; k < 3; k++) {
-        view->eye[k] = (float)uniform(-4, 4);
-        target[k] = (float)uniform(-2, 2);
+        view->eye[k] = (float)uniform(&state, -4, 4);
+        target[k] = (float)uniform(&state, -2, 2);
     }
     glm_lookat(view->eye, target, (vec3){0.1f, 1, 0.05f}, look);
-    float scale = (float)uniform(0.5, 3);
+    float scale = (float)uniform(&state, 0.5, 3);
     glm_mat4_zero(lens);
     lens[0][0] = scale * HEIGHT / WIDTH, lens[1][1] = scale;
     lens[2][3] = -1, lens[3][2] = (float)near_z;
     glm_mat4_mul(lens, look, view->world_to_clip);
-    view->faces = uniform(0, 1) < 0.5 ? CULL_SINGLE_SIDED : CULL_NONE;
+    view->faces = uniform(&state, 0, 1) < 0.5 ? CULL_SINGLE_SIDED : CULL_NONE;
 }
 
 static float positions[CORNERS][3];
@@ -49,20 +44,20 @@ static bool has_holes(uint32_t triangle)
 static void make_triangles(void)
 {
     for (uint32_t i = 0; i < TRIANGLES; i++) {
-        double size = pow(10, uniform(-2, i % 8 ? 0 : 1)), center[3];
+        double size = pow(10, uniform(&state, -2, i % 8 ? 0 : 1)), center[3];
         for (int k = 0; k < 3; k++)
-            center[k] = uniform(-2, 2);
+            center[k] = uniform(&state, -2, 2);
         for (uint32_t c = 3 * i; c < 3 * i + 3; c++) {
             indices[c] = c;
             for (int k = 0; k < 3; k++)
-                positions[c][k] = (float)(center[k] + uniform(-size, size));
+                positions[c][k] = (float)(center[k] + uniform(&state, -size, size));
             for (int k = 0; k < 2; k++)
-                attributes[c].uv[0][k] = (float)uniform(-2, 2);
+                attributes[c].uv[0][k] = (float)uniform(&state, -2, 2);
             attributes[c].color[3] = 255;
         }
     }
     for (int i = 0; i < TEXELS * TEXELS; i++)
-        texels[4 * i + 3] = uniform(0, 1) < 0.5 ? 0 : 255;
+        texels[4 * i + 3] = uniform(&state, 0, 1) < 0.5 ? 0 : 255;
 }
 
 /* What a place shows of one triangle: its depth, or 0. doubt: something near decides. */
@@ -194,12 +189,12 @@ int main(void)
         make_triangles();
         areas[0] = areas[1] = -1;
         for (int i = 0; i < DOWN * ACROSS; i++)
-            tiles[i] = (struct cover_tile){i % 3 ? 0 : (float)(near_z / uniform(1, 9)),
-                i % 4 ? 0 : (uint32_t)uniform(0, 65536)};
+            tiles[i] = (struct cover_tile){i % 3 ? 0 : (float)(near_z / uniform(&state, 1, 9)),
+                i % 4 ? 0 : (uint32_t)uniform(&state, 0, 65536)};
         memset(depths, 0, sizeof depths);
         memcpy(cover.world_to_clip, view.world_to_clip, sizeof view.world_to_clip);
         struct cull_piece piece = {
-            .pixels = 1e7, .most = round % 2 ? (double)INFINITY : uniform(0, 1e7)};
+            .pixels = 1e7, .most = round % 2 ? (double)INFINITY : uniform(&state, 0, 1e7)};
         do {
             piece.work = 0;
             cover_scene(&scene, &view, &(struct cover_scene){0}, &cover, &piece);

@@ -3,6 +3,7 @@
  * are counted here one by one. */
 #include "renderer/scene/cull.h"
 #include "tests/unit/check.h"
+#include "tests/unit/random.h"
 #include <cglm/cglm.h>
 
 enum {
@@ -23,25 +24,19 @@ static struct psc_instance instances[INSTANCES];
 static float areas[MESHLETS];
 static struct cull_command commands[INSTANCES * MESHLETS + 1];
 
-static double uniform(double low, double high)
-{
-    state = state * 6364136223846793005u + 1442695040888963407u;
-    return low + (high - low) * (double)(state >> 11) / 9007199254740992.0;
-}
-
 /* A camera somewhere, or a light whose rays are parallel. */
 static void make_view(struct cull_view *view)
 {
     vec3 target;
     mat4 look, lens;
     memset(view, 0, sizeof *view);
-    view->parallel = uniform(0, 1) < 0.4;
+    view->parallel = uniform(&state, 0, 1) < 0.4;
     for (int k = 0; k < 3; k++) {
-        view->eye[k] = (float)uniform(-9, 9);
-        target[k] = (float)uniform(-2, 2);
+        view->eye[k] = (float)uniform(&state, -9, 9);
+        target[k] = (float)uniform(&state, -2, 2);
     }
     glm_lookat(view->eye, target, (vec3){0.1f, 1, 0.05f}, look);
-    float scale = (float)uniform(0.5, 3);
+    float scale = (float)uniform(&state, 0.5, 3);
     glm_mat4_zero(lens);
     if (view->parallel) {
         lens[0][0] = lens[1][1] = scale / 4;
@@ -57,18 +52,18 @@ static void make_view(struct cull_view *view)
 static void make_scene(void)
 {
     for (uint32_t m = 0; m < MESHLETS; m++) {
-        double size = pow(10, uniform(-2, 0.7)), center[3];
+        double size = pow(10, uniform(&state, -2, 0.7)), center[3];
         struct psc_meshlet *meshlet = &meshlets[m];
         *meshlet = (struct psc_meshlet){.first_index = 3 * EACH * m, .index_count = 3 * EACH};
         meshlet->cone_cutoff = 2;
         for (int k = 0; k < 3; k++)
-            meshlet->center[k] = (float)(center[k] = uniform(-4, 4));
+            meshlet->center[k] = (float)(center[k] = uniform(&state, -4, 4));
         for (uint32_t i = 0; i < 3 * EACH; i++) {
             uint32_t vertex = 3 * EACH * m + (i * 7) % (3 * EACH);
             float distance = 0;
             indices[meshlet->first_index + i] = vertex;
             for (int k = 0; k < 3; k++) {
-                positions[vertex][k] = (float)(center[k] + uniform(-size, size));
+                positions[vertex][k] = (float)(center[k] + uniform(&state, -size, size));
                 distance = hypotf(distance, positions[vertex][k] - meshlet->center[k]);
             }
             meshlet->radius = fmaxf(meshlet->radius, distance * 1.0001f);
@@ -78,7 +73,7 @@ static void make_scene(void)
     for (uint32_t i = 0; i < INSTANCES; i++) {
         instances[i] = (struct psc_instance){{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}, 0, 0};
         for (int k = 0; k < 12; k++)
-            instances[i].world[k] += (float)uniform(-0.7, 0.7);
+            instances[i].world[k] += (float)uniform(&state, -0.7, 0.7);
     }
 }
 
@@ -172,7 +167,7 @@ int main(void)
         uint32_t drawn = draw(&view, &list, &all), count = unroll(&list, whole, 0), got = 0;
         CHECK(drawn == count && !all.more && all.instance == INSTANCES);
         struct cull_piece piece = {
-            .pixels = all.pixels, .most = pow(10, uniform(1, 5)), .more = true};
+            .pixels = all.pixels, .most = pow(10, uniform(&state, 1, 5)), .more = true};
         uint32_t pieces = 0;
         double sum = 0;
         for (; piece.more && pieces < MOST_PIECES; pieces++) {

@@ -1,8 +1,8 @@
 /* How soon a render that is watched shows something, and what watching costs.
  *
- *     penumbra-parts [rounds]
+ *     penumbra-parts [rounds [samples [method]]]
  *
- * For raytraced and multisample with 1024 samples at 800 x 600: the time to the first picture over
+ * For raytraced and multisample with 1024 samples at 800 x 600, or as asked: the time to the first picture over
  * that of a whole pcss picture; the time of a watched render, with as many pictures as the worker
  * would show to one who takes all, over that of an unwatched one; and that of one in turns, which
  * nobody watches, over one in one piece. The last two also in time on processors, which other
@@ -95,11 +95,11 @@ static double median(double *values, int count)
     return values[count / 2];
 }
 
-static void make_request(struct pen_request *request, const uint8_t *scene, const char *technique)
+static void make_request(
+    struct pen_request *request, const uint8_t *scene, const char *technique, double samples)
 {
     const struct pen_catalogue *catalogue = pen_renderer_catalogue();
     const struct pen_technique_info *info = pen_catalogue_find(catalogue, technique);
-    double samples = 1024;
     pen_request_default(request, catalogue);
     memcpy(request->scene, scene, PEN_ID_BYTES);
     memset(request->technique, 0, sizeof request->technique);
@@ -107,7 +107,7 @@ static void make_request(struct pen_request *request, const uint8_t *scene, cons
     strcpy(request->technique, technique);
     pen_params_default(info->params, request->technique_params);
     const struct pen_param *row = pen_param_find(info->params, "samples");
-    if (row && row->max >= samples)
+    if (row && samples > 0 && row->max >= samples)
         pen_param_store(row, request->technique_params, &samples, "", NULL);
 }
 
@@ -120,6 +120,8 @@ int main(int argc, char **argv)
     uint8_t id[PEN_ID_BYTES] = {1};
     int rounds = argc > 1 ? atoi(argv[1]) : 5;
     rounds = rounds < 1 ? 1 : rounds > MAX_ROUNDS ? MAX_ROUNDS : rounds;
+    double samples = argc > 2 ? atof(argv[2]) : 1024;
+    const char *only = argc > 3 ? argv[3] : NULL;
     struct pen_renderer *r = pen_renderer_create(&config, &error);
     FILE *file = tmpfile();
     void *data = NULL;
@@ -131,13 +133,15 @@ int main(int argc, char **argv)
         return 1;
     }
     struct pen_request pcss, sampled;
-    make_request(&pcss, id, "pcss");
+    make_request(&pcss, id, "pcss", 0);
     measure(r, &pcss, TURN_MS, NULL); /* compiles */
     for (int m = 0; m < 2; m++) {
         double first[MAX_ROUNDS], ratios[4][MAX_ROUNDS];
         struct cost one_piece = {0}, quick = {0};
         struct watching watching;
-        make_request(&sampled, id, names[m]);
+        if (only && strcmp(only, names[m]) != 0)
+            continue;
+        make_request(&sampled, id, names[m], samples);
         measure(r, &sampled, TURN_MS, &watching);
         for (int i = 0; i < rounds; i++) {
             quick = measure(r, &pcss, TURN_MS, NULL);
@@ -150,10 +154,10 @@ int main(int argc, char **argv)
             ratios[2][i] = turns.ms / one_piece.ms;
             ratios[3][i] = turns.processor_ms / one_piece.processor_ms;
         }
-        printf("%s 1024: first picture %.2f of a pcss picture (%.0f ms)\n"
+        printf("%s %.0f: first picture %.2f of a pcss picture (%.0f ms)\n"
                "  watched %.3f of unwatched (processors %.3f), %u pictures on the way\n"
                "  in turns %.3f of one piece (processors %.3f), %.0f ms\n",
-            names[m], median(first, rounds), quick.ms, median(ratios[0], rounds),
+            names[m], samples, median(first, rounds), quick.ms, median(ratios[0], rounds),
             median(ratios[1], rounds), watching.count, median(ratios[2], rounds),
             median(ratios[3], rounds), one_piece.ms);
         fflush(stdout);

@@ -26,6 +26,7 @@ struct technique_turns {
     struct gl_fiber *fiber; /* NULL: it never does */
     double most_ms;         /* a turn should last at most so long */
     double since_ms;        /* when this one began; gl_now_ms */
+    double piece_ms;        /* when the last piece was done, likewise */
     double used_ms;         /* that those before it took */
     uint32_t number;
     uint32_t frame, light; /* that it is at */

@@ -103,12 +103,12 @@ struct pen_trace_job {
     struct pen_trace_kept **kept;
     uint32_t threads;     /* 0: as many as this process may run on */
     uint64_t deadline_ns; /* CLOCK_MONOTONIC; 0: none */
-    /* Called on the caller's thread while nobody traces, whenever about turn_ms have passed. False:
-     * the job ends with an error. NULL: it is done in one go. */
+    /* Called on the caller's thread whenever about turn_ms have passed; the other threads end the tile
+     * that they are at and wait. False: the job ends with an error. NULL: it is done in one go. */
     bool (*turn)(void *context);
     void *turn_context;
     double turn_ms;
-    /* Called likewise whenever all receivers have had `done` of the samples. SHOW: the result's arrays
+    /* Called likewise, while nobody traces, whenever all receivers have had `done` of the samples. SHOW: the result's arrays
      * are filled with what that gives, and `show` is called; false from it as from `turn`. STOP: that
      * is the result. NULL: nobody asks. */
     enum pen_trace_step (*step)(void *context, uint32_t done, uint32_t total);

@@ -46,9 +46,13 @@ static bool is_time_up(const struct technique_turns *turns)
            (turns->stop_used_ms > 0 && used > turns->stop_used_ms);
 }
 
-static bool is_over(const struct technique_ctx *ctx, double now)
+/* Another piece like the last one would not end in time, or somebody calls. */
+static bool is_over(struct technique_ctx *ctx, double now)
 {
-    return now - ctx->turns.since_ms >= ctx->turns.most_ms ||
+    struct technique_turns *turns = &ctx->turns;
+    double last = now - fmax(turns->piece_ms, turns->since_ms);
+    turns->piece_ms = now;
+    return now + last - turns->since_ms >= turns->most_ms ||
            (ctx->is_called && ctx->is_called(ctx->call_context));
 }
 

@@ -102,7 +102,6 @@ struct pen_trace_scene {
     _Atomic int64_t bytes; /* everything */
     atomic_bool over_budget;
     struct pen_trace_scene_info info;
-    double tile_ms; /* what a sample of an image's tile took at most, lately */
 };
 
 /* The context of a query: Embree's own first, so that filters can cast back. */
@@ -130,10 +129,18 @@ bool trace_check_device(struct pen_trace_scene *scene, struct pen_error *error);
 /* Alpha at a point of triangle `primitive`; u, v as Embree gives them. */
 float trace_alpha_at(const struct trace_alpha *alpha, uint32_t primitive, float u, float v);
 
-/* Calls work(context, item) for every item below `count` on `threads` threads, the caller's among
- * them, with denormals flushed. Adds their processor time to *cpu_seconds. */
-void trace_parallel(uint32_t threads, uint32_t count, void (*work)(void *context, uint32_t item),
-    void *context, double *cpu_seconds);
+/* run(context, item) is to be called for every item below `count`. */
+struct trace_work {
+    void (*run)(void *context, uint32_t item);
+    void *context;
+    uint32_t count;
+    /* As pen_trace_job has them; NULL: it is done in one go. */
+    bool (*turn)(void *context);
+    double turn_ms;
+};
+/* On `threads` threads, the caller's among them, with denormals flushed. Adds their processor time to
+ * *cpu_seconds. False: a turn said so, and items are left out. */
+bool trace_parallel(uint32_t threads, const struct trace_work *work, double *cpu_seconds);
 /* `threads`, or how many this process may use when that is 0. */
 uint32_t trace_thread_count(uint32_t threads);
 double trace_seconds(void);

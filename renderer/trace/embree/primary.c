@@ -143,7 +143,8 @@ bool pen_trace_primary(struct pen_trace_scene *scene, const struct pen_trace_cam
         .blocks_x = blocks_x,
         .rtc = hierarchy->scene};
     double cpu_seconds = 0;
-    trace_parallel(trace_thread_count(threads), blocks_x * blocks_y, trace_block, &p, &cpu_seconds);
+    const struct trace_work work = {trace_block, &p, blocks_x * blocks_y, NULL, 0};
+    trace_parallel(trace_thread_count(threads), &work, &cpu_seconds);
     trace_hierarchy_release(scene, hierarchy);
     return true;
 }

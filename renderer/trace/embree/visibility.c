@@ -8,9 +8,6 @@
 
 #define TILE 16 /* receivers along an edge; a multiple of 4 */
 #define TILE_RECEIVERS (TILE * TILE)
-#define FIRST_TILES 4 /* of each thread, before their speed is known */
-#define MOST_GROWTH 4
-#define REMEMBERED 0.9
 
 struct run {
     struct pen_trace_scene *scene;
@@ -29,7 +26,7 @@ struct run {
     bool enough;    /* there are no more wanted */
     bool keeps;     /* for another job */
     uint32_t tiles_x, tile_width, tile_height;
-    uint32_t tiles, first_tile; /* of all, and of the piece at hand */
+    uint32_t tiles;
     _Atomic uint64_t rays, receivers, full_receivers;
     atomic_bool late;
 };
@@ -41,7 +38,6 @@ struct tile {
 static struct tile tile_of(const struct run *run, uint32_t item)
 {
     const struct pen_trace_job *job = run->job;
-    item += run->first_tile;
     struct tile t = {item % run->tiles_x * run->tile_width, item / run->tiles_x * run->tile_height};
     t.x1 = t.x0 + run->tile_width < job->width ? t.x0 + run->tile_width : job->width;
     t.y1 = t.y0 + run->tile_height < job->height ? t.y0 + run->tile_height : job->height;
@@ -392,46 +388,22 @@ static bool check_job(
     return true;
 }
 
-/* What rays of so many samples are expected to let pass in a turn, after what they took when there
- * were some. Tiles are unlike: the slowest count, and are forgotten slowly; 0: not known yet. */
-static uint32_t next_piece(struct run *run, uint32_t piece, uint32_t samples, double ms)
+static bool take_turn(void *context)
 {
-    double *slowest = &run->scene->tile_ms, now = piece ? ms / ((double)piece * samples) : 0;
-    *slowest = fmax(now, REMEMBERED * *slowest);
-    double fit = run->job->turn_ms / (*slowest * samples);
-    return *slowest > 0 ? (uint32_t)fmin(fmax(fit, 1), 1 << 30) : 0;
+    struct run *run = context;
+    if (atomic_load(&run->late) || !run->job->turn(run->job->turn_context))
+        atomic_store(&run->late, true);
+    return !atomic_load(&run->late);
 }
 
-/* All tiles; in pieces that last about a turn each when others want to come in between. `samples`: whose
- * rays the work traces; 0: none. */
-static bool over_tiles(struct run *run, uint32_t threads,
-    void (*work)(void *context, uint32_t item), uint32_t samples, double *seconds)
+/* All tiles; now and then others come in between when they want to. */
+static bool over_tiles(
+    struct run *run, uint32_t threads, void (*tile)(void *context, uint32_t item), double *seconds)
 {
     const struct pen_trace_job *job = run->job;
-    uint32_t known = job->turn && samples ? next_piece(run, 0, samples, 0) : 0;
-    uint32_t piece = !job->turn ? run->tiles : known ? known : FIRST_TILES * threads;
-    for (run->first_tile = 0; run->first_tile < run->tiles;) {
-        uint32_t left = run->tiles - run->first_tile;
-        double start = trace_seconds(), worked = *seconds;
-        piece = piece < threads ? threads : piece;
-        piece = piece < left ? piece : left;
-        trace_parallel(threads, piece, work, run, seconds);
-        run->first_tile += piece;
-        if (!job->turn)
-            continue;
-        /* Other processes may be on the processors, too. */
-        double ms = 1e3 * fmin(trace_seconds() - start, *seconds - worked);
-        double most = (double)piece * MOST_GROWTH;
-        double fit =
-            samples ? next_piece(run, piece, samples, ms) : piece * job->turn_ms / fmax(ms, 1e-6);
-        piece = (uint32_t)fmin(fit, most);
-        if (run->first_tile == run->tiles)
-            break;
-        if (atomic_load(&run->late) || !job->turn(job->turn_context)) {
-            atomic_store(&run->late, true);
-            break;
-        }
-    }
+    const struct trace_work work = {
+        tile, run, run->tiles, job->turn ? take_turn : NULL, job->turn_ms};
+    trace_parallel(threads, &work, seconds);
     return !atomic_load(&run->late);
 }
 
@@ -445,7 +417,7 @@ static bool look_up(struct run *run, uint32_t threads, uint32_t taken, double *c
         return true;
     run->taken = taken;
     run->enough = step == PEN_TRACE_STOP;
-    if (!over_tiles(run, threads, estimate_tile, 0, cpu_seconds) ||
+    if (!over_tiles(run, threads, estimate_tile, cpu_seconds) ||
         (!run->enough && !job->show(job->turn_context)))
         atomic_store(&run->late, true);
     return !atomic_load(&run->late);
@@ -462,15 +434,15 @@ static bool select_receivers(
     run->kept.verdicts = calloc(count, 1);
     if (early && !(run->early = calloc(count, 1)))
         return pen_fail(error, PEN_INTERNAL, "", "Out of memory.");
-    if (early && (!over_tiles(run, threads, early_tile, TRACE_PRETEST_FIRST, cpu_seconds) ||
+    if (early && (!over_tiles(run, threads, early_tile, cpu_seconds) ||
                      !look_up(run, threads, TRACE_PRETEST_FIRST, cpu_seconds) || run->enough))
         return true;
     run->kept.full = calloc(count, 1);
     if (!run->kept.verdicts || !run->kept.full)
         return pen_fail(error, PEN_INTERNAL, "", "Out of memory.");
-    if (over_tiles(run, threads, pretest_tile, TRACE_PRETEST_NET, cpu_seconds) && !spread(run))
+    if (over_tiles(run, threads, pretest_tile, cpu_seconds) && !spread(run))
         return pen_fail(error, PEN_INTERNAL, "", "Out of memory.");
-    if (over_tiles(run, threads, settle_tile, 0, cpu_seconds) && early)
+    if (over_tiles(run, threads, settle_tile, cpu_seconds) && early)
         look_up(run, threads, TRACE_PRETEST_NET, cpu_seconds);
     return true;
 }
@@ -486,13 +458,12 @@ static bool sample_all(struct run *run, uint32_t threads, double *cpu_seconds)
     uint32_t blocks = run->kept.counts ? run->points.block_count : 1;
     run->taken = run->kept.samples;
     if (run->taken == run->samples)
-        return over_tiles(run, threads, estimate_tile, 0, cpu_seconds);
+        return over_tiles(run, threads, estimate_tile, cpu_seconds);
     if (run->taken && !look_up(run, threads, run->taken, cpu_seconds))
         return false;
     for (run->block = run->kept.blocks; run->block < blocks && !run->enough; run->block++) {
         uint32_t end = run->taken + run->points.blocks[run->block].count;
-        uint32_t samples = run->kept.counts ? end - run->taken : run->samples;
-        if (!over_tiles(run, threads, sample_tile, samples, cpu_seconds))
+        if (!over_tiles(run, threads, sample_tile, cpu_seconds))
             return false;
         run->kept.samples = end;
         run->kept.blocks = run->block + 1;
@@ -564,9 +535,9 @@ bool pen_trace_visibility(struct pen_trace_scene *scene, const struct pen_trace_
     run.tiles = run.tiles_x * ((job->height + run.tile_height - 1) / run.tile_height);
     uint32_t threads = trace_thread_count(job->threads);
     take_over(&run);
-    over_tiles(&run, threads, clear_tile, 0, &cpu_seconds);
+    over_tiles(&run, threads, clear_tile, &cpu_seconds);
     if (run.kept.verdicts)
-        over_tiles(&run, threads, settle_tile, 0, &cpu_seconds);
+        over_tiles(&run, threads, settle_tile, &cpu_seconds);
     else if (job->adaptive && !run.kept.samples &&
              run.samples > TRACE_PRETEST_NET + TRACE_PRETEST_RIM &&
              !select_receivers(&run, threads, &cpu_seconds, error))

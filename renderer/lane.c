@@ -81,10 +81,12 @@ bool lane_advance(struct lane *lane, double ms)
     turns->most_ms = ms;
     turns->since_ms = gl_now_ms();
     lane->ended = gl_fiber_resume(lane->fiber);
-    if (lane->ended && turns->fence) {
-        gl.DeleteSync(turns->fence);
-        turns->fence = NULL;
-    }
+    GLsync *left[] = {&turns->fence, &turns->under_way.fence};
+    for (int i = 0; lane->ended && i < 2; i++)
+        if (*left[i]) {
+            gl.DeleteSync(*left[i]);
+            *left[i] = NULL;
+        }
     return lane->ended;
 }
 

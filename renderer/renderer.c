@@ -29,6 +29,7 @@ struct pen_renderer {
     struct pen_device_info device;
     struct technique_ctx ctx; /* what lanes share */
     struct pen_render renders[PEN_MAX_RENDERS];
+    const struct pen_render *advanced; /* the last one */
     uint64_t budget, clock;
     bool lost;
     struct scene *scenes[MAX_RESIDENT]; /* emission images too: scenes without geometry */
@@ -496,6 +497,10 @@ void pen_render_continue(struct pen_render *render)
 
 bool pen_render_advance(struct pen_render *render, double ms)
 {
+    struct pen_renderer *r = render->renderer;
+    if (r->ctx.software && r->advanced != render)
+        gl_wait(); /* what another has under way would be taken for this one's */
+    r->advanced = render;
     gl_targets_charge(&render->target_bytes);
     bool ended = lane_advance(&render->lane, ms);
     gl_targets_charge(NULL);

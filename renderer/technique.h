@@ -21,6 +21,16 @@ struct history_store;
 struct kept_sums;
 struct kept_sums_store;
 
+/* A piece of work that a software rasteriser has been given. */
+struct technique_piece {
+    GLsync fence; /* NULL: there is none */
+    uint64_t kind;
+    double units;   /* of technique_speed; < 0: it tells nothing of others */
+    uint32_t waits; /* gl_waits when it was handed over */
+    double away_ms; /* of technique_turns, then */
+    struct gl_stopwatch since;
+};
+
 /* A frame in progress gives way to others between two pieces of work (passes/draw/turn.h). */
 struct technique_turns {
     struct gl_fiber *fiber; /* NULL: it never does */
@@ -36,6 +46,8 @@ struct technique_turns {
     bool stopped; /* it was */
     bool held;    /* what is under way must not be interrupted */
     GLsync fence; /* of the last piece but one */
+    struct technique_piece under_way;
+    double away_ms; /* between turns */
 };
 
 /* What a software rasteriser takes for a kind of work. */

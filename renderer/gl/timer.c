@@ -6,6 +6,19 @@
 
 #define ROOM (sizeof((struct gl_timer *)0)->passes / sizeof((struct gl_timer *)0)->passes[0])
 
+static uint32_t waits; /* there is one GL thread */
+
+void gl_wait(void)
+{
+    gl.Finish();
+    waits++;
+}
+
+uint32_t gl_waits(void)
+{
+    return waits;
+}
+
 static double read_clock(clockid_t clock)
 {
     struct timespec t;
@@ -62,7 +75,7 @@ void gl_timer_begin(struct gl_timer *timer, enum pen_stage stage, const char *na
     timer->open[timer->depth] = i;
     timer->nested_ms[timer->depth] = 0;
     if (timer->software) {
-        gl.Finish();
+        gl_wait();
         timer->begun_ms[timer->depth] = gl_now_ms();
     } else {
         if (!timer->passes[i].queries[0])
@@ -82,7 +95,7 @@ void gl_timer_end(struct gl_timer *timer)
         gl.QueryCounter(timer->passes[i].queries[1], GL_TIMESTAMP);
         return;
     }
-    gl.Finish();
+    gl_wait();
     double total = gl_now_ms() - timer->begun_ms[timer->depth];
     timer->passes[i].ms = total - timer->nested_ms[timer->depth];
     if (timer->depth)

@@ -38,6 +38,10 @@ void gl_timer_collect(struct gl_timer *timer, struct pen_result *result);
 
 double gl_now_ms(void); /* monotonic */
 
+/* Until all is done that was handed over to the device; and how often that was done. */
+void gl_wait(void);
+uint32_t gl_waits(void);
+
 /* How long work takes, for who cuts it: where other processes are on the processors too, not longer
  * than what all threads of this one have worked. */
 struct gl_stopwatch {

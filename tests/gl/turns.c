@@ -193,6 +193,42 @@ static bool count_call(void *context)
     return true;
 }
 
+static void (*real_finish)(void);
+static uint32_t finishes;
+
+static void count_finish(void)
+{
+    finishes++;
+    real_finish();
+}
+
+/* In turns a software device is not made to wait more often than in one piece: there is always something
+ * more for it to do, except where another render was at it. */
+static void check_busy(struct pen_renderer *r, const uint8_t scene[PEN_ID_BYTES])
+{
+    struct pen_request request;
+    struct pen_result result;
+    struct pen_frame frame;
+    struct pen_error error = {0};
+    uint32_t turns = 1;
+    fixture_request(&request, scene, "multisample");
+    make_cheap(&request, 40);
+    uint64_t expected = whole(r, &request);
+    real_finish = gl.Finish;
+    gl.Finish = count_finish;
+    CHECK(whole(r, &request) == expected);
+    uint32_t most = finishes + 1;
+    finishes = 0;
+    pen_renderer_drop_shadows(r);
+    struct pen_render *render = pen_render_begin(r, &request, &frame, &result, &error);
+    while (!pen_render_advance(render, 1))
+        turns++;
+    CHECK(pen_render_end(render, &error) && hash_frame(&frame) == expected);
+    gl.Finish = real_finish;
+    CHECK(turns > 40 && finishes <= most);
+    pen_frame_finish(&frame);
+}
+
 /* Who is called comes back after each piece of work, whatever time there is. */
 static void check_calling(void)
 {
@@ -233,6 +269,7 @@ int main(void)
     fixture_scene(r, PEN_GENERATED_PLANAR_MASK, 0, 1, scenes[1]);
     check_methods(r, scenes);
     check_giving_up(r, scenes[1]);
+    check_busy(r, scenes[1]);
     pen_renderer_destroy(r);
     check_calling();
     CHECK(gl_targets_bytes() == 0);

@@ -6,8 +6,6 @@
 #define PIXELS_ON_GPU (1u << 24)
 #define FIRST_PIXELS (1u << 12)
 #define MOST_GROWTH 4.0
-/* Not everything that a pass draws costs the same: the most counts, and is forgotten slowly. */
-#define REMEMBERED 0.9
 /* Of a software rasteriser's tiles; where a row of these takes too long, of a classifier's. */
 #define TILE 64
 #define LOW_ROWS 16
@@ -54,7 +52,7 @@ void pass_pieces_begin(struct technique_ctx *ctx, struct pass_pieces *pieces, ui
         return;
     double known = ctx->software ? pass_speed(ctx, kind)->ms : 0;
     cut(pieces, !ctx->software ? PIXELS_ON_GPU
-                : known > 0    ? ctx->turns.most_ms / known
+                : known > 0    ? PASS_PIECE_SHARE * ctx->turns.most_ms / known
                                : FIRST_PIXELS);
 }
 
@@ -66,17 +64,15 @@ void pass_pieces_aim(const struct pass_pieces *p)
     gl.Scissor((GLint)p->x, (GLint)p->y, (GLsizei)p->columns, (GLsizei)p->rows);
 }
 
-/* Pixels that the next piece should have. */
-static double learn(struct technique_ctx *ctx, const struct pass_pieces *p)
+/* The piece at hand is drawn. Pixels that the next one should have. */
+static double learn(struct technique_ctx *ctx, const struct pass_pieces *p, bool last)
 {
     double pixels = (double)p->columns * p->rows;
     if (!ctx->software)
         return PIXELS_ON_GPU;
-    gl.Finish();
-    double ms = gl_stopwatch_ms(&p->since);
-    struct technique_speed *speed = pass_speed(ctx, p->kind);
-    speed->ms = fmax(ms / pixels, REMEMBERED * speed->ms);
-    return fmin(ctx->turns.most_ms / speed->ms, MOST_GROWTH * pixels);
+    pass_hand_over(ctx, p->kind, pixels, &p->since, last);
+    double known = pass_speed(ctx, p->kind)->ms, most_ms = PASS_PIECE_SHARE * ctx->turns.most_ms;
+    return known > 0 ? fmin(most_ms / known, MOST_GROWTH * pixels) : pixels;
 }
 
 bool pass_pieces_next(
@@ -84,20 +80,17 @@ bool pass_pieces_next(
 {
     *more = false;
     if (is_whole(p)) {
-        if (!pass_turn_is_whole(ctx))
-            learn(ctx, p);
+        learn(ctx, p, true);
         return true;
     }
     gl.Disable(GL_SCISSOR_TEST);
-    double pixels = learn(ctx, p);
-    p->x += p->columns;
-    if (p->x == p->width) {
-        p->x = 0;
-        p->y += p->rows;
-    }
-    *more = p->y < p->height;
+    bool ends_row = p->x + p->columns == p->width;
+    *more = !ends_row || p->y + p->rows < p->height;
+    double pixels = learn(ctx, p, !*more);
     if (!*more)
         return true;
+    p->x = ends_row ? 0 : p->x + p->columns;
+    p->y += ends_row ? p->rows : 0;
     cut(p, pixels);
     if (!pass_turn(ctx, error))
         return false;

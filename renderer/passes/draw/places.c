@@ -82,6 +82,7 @@ static bool cover_rows(struct technique_ctx *ctx, struct scene *scene, const str
     memcpy(cover.across, places_across, sizeof places_across);
     memcpy(cover.down, places_down, sizeof places_down);
     pass_bands_begin(ctx, &bands, view->width, which->rows, view->width * which->rows, COVER_KIND);
+    bands.by_hand = true;
     while (ok && more) {
         struct cull_view cull;
         view_to_cull(view, &cull);

@@ -9,7 +9,8 @@
 #define FIRST_WORK (1u << 22)
 #define LEAST_WORK (1u << 20)
 #define WORK_ON_GPU (1ull << 35)
-/* Of unlike pieces the slowest counts, and is forgotten slowly. */
+/* Of unlike pieces, and not everything that a pass draws costs the same, the slowest counts, and is forgotten
+ * slowly. */
 #define REMEMBERED 0.9
 
 /* Waits until what was handed over before the last call is done, so that no more than two pieces are
@@ -73,6 +74,7 @@ bool pass_turn(struct technique_ctx *ctx, struct pen_error *error)
         gl_timer_go_on(&ctx->timer);
         turns->number++;
         turns->since_ms = gl_now_ms();
+        turns->away_ms += turns->since_ms - ctx->timer.stopped_ms;
         gl.BindBufferBase(GL_UNIFORM_BUFFER, UBO_VIEW, ctx->view_block);
         gl.BindBufferBase(GL_UNIFORM_BUFFER, UBO_LIGHT, ctx->light_block);
         gl.BindBufferBase(GL_UNIFORM_BUFFER, UBO_PARAMS, ctx->param_block);
@@ -85,7 +87,7 @@ bool pass_turn(struct technique_ctx *ctx, struct pen_error *error)
 bool pass_turn_inside(struct technique_ctx *ctx, struct pen_error *error)
 {
     if (!pass_turn_is_whole(ctx) && ctx->software)
-        gl.Finish();
+        gl_wait();
     return pass_turn(ctx, error);
 }
 
@@ -120,25 +122,70 @@ void pass_bands_begin(struct technique_ctx *ctx, struct pass_bands *bands, uint3
         bands->rows = height;
     bands->piece.most = pass_turn_is_whole(ctx) ? INFINITY
                         : !ctx->software        ? (double)WORK_ON_GPU
-                        : known > 0             ? fmax(ctx->turns.most_ms / known, LEAST_WORK)
-                                                : FIRST_WORK;
+                        : known > 0
+                            ? fmax(PASS_PIECE_SHARE * ctx->turns.most_ms / known, LEAST_WORK)
+                            : FIRST_WORK;
     begin_piece(bands);
 }
 
-/* What was drawn last is done: how long it took, and how much is to be drawn at once from here on. */
+/* Until what is under way is done. As pass_hand_over. */
+static double catch_up(struct technique_ctx *ctx)
+{
+    struct technique_turns *turns = &ctx->turns;
+    struct technique_piece *piece = &turns->under_way;
+    if (!piece->fence)
+        return 0;
+    gl.ClientWaitSync(piece->fence, GL_SYNC_FLUSH_COMMANDS_BIT, UINT64_MAX);
+    gl.DeleteSync(piece->fence);
+    piece->fence = NULL;
+    if (piece->waits != gl_waits() || piece->units < 0)
+        return 0;
+    double ms = fmax(gl_stopwatch_ms(&piece->since) - (turns->away_ms - piece->away_ms), 1e-3);
+    if (piece->units > 0) {
+        struct technique_speed *speed = pass_speed(ctx, piece->kind);
+        speed->ms = fmax(ms / piece->units, REMEMBERED * speed->ms);
+    }
+    return ms;
+}
+
+double pass_hand_over(struct technique_ctx *ctx, uint64_t kind, double units,
+    const struct gl_stopwatch *since, bool wait)
+{
+    struct technique_turns *turns = &ctx->turns;
+    if (!ctx->software || pass_turn_is_whole(ctx))
+        return 0;
+    struct technique_piece piece = {.fence = gl.FenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0),
+        .kind = kind,
+        .units = units,
+        .waits = gl_waits(),
+        .since = *since};
+    bool follows = turns->under_way.fence && turns->under_way.waits == piece.waits;
+    double ms = catch_up(ctx);
+    wait |= units > 0 && pass_speed(ctx, kind)->ms == 0;
+    if (follows)
+        piece.since = gl_stopwatch_start(); /* it begins when that ends */
+    else if (!wait)
+        piece.units = -1; /* it ends unseen while the next one is handed over */
+    piece.away_ms = turns->away_ms;
+    turns->under_way = piece;
+    return wait ? catch_up(ctx) : ms;
+}
+
+/* The piece at hand is drawn: learns how long such pieces take, and how much is to be drawn at once from
+ * here on. */
 static void learn(struct technique_ctx *ctx, struct pass_bands *bands)
 {
-    gl.Finish();
-    double ms = gl_stopwatch_ms(&bands->since), most_ms = ctx->turns.most_ms;
     struct cull_piece *piece = &bands->piece;
     bool first = bands->slowest_ms == 0;
-    if (!piece->compiles)
-        bands->slowest_ms = fmax(bands->slowest_ms, ms);
-    if (piece->work > LEAST_WORK && !piece->compiles) { /* what is less tells little */
-        struct technique_speed *speed = pass_speed(ctx, bands->kind);
-        speed->ms = fmax(ms / piece->work, REMEMBERED * speed->ms);
-        piece->most = fmax(fmin(most_ms / speed->ms, 4 * piece->most), LEAST_WORK);
-    }
+    double most_ms = PASS_PIECE_SHARE * ctx->turns.most_ms;
+    double units = piece->compiles            ? -1
+                   : piece->work > LEAST_WORK ? piece->work
+                                              : 0; /* what is less tells little */
+    double ms = pass_hand_over(ctx, bands->kind, units, &bands->since, bands->by_hand);
+    bands->slowest_ms = fmax(bands->slowest_ms, ms);
+    double known = pass_speed(ctx, bands->kind)->ms;
+    if (known > 0)
+        piece->most = fmax(fmin(most_ms / known, 4 * piece->most), LEAST_WORK);
     if (piece->more || bands->slowest_ms == 0)
         return;
     /* Where there are several pieces, rows count only if one triangle is too much. */
@@ -174,10 +221,10 @@ bool pass_bands_next(
     *more = piece->more || below < bands->height;
     if (bands->rows != bands->height)
         gl.Disable(GL_SCISSOR_TEST);
-    if (!*more)
-        return true;
     if (ctx->software && !pass_turn_is_whole(ctx))
         learn(ctx, bands);
+    if (!*more)
+        return true;
     if (!piece->more) {
         uint32_t left = bands->height - below;
         bands->y = below;

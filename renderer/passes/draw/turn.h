@@ -17,6 +17,15 @@ void pass_bind_counts(struct technique_ctx *ctx, GLuint buffer);
 /* What was measured of a kind of work; of one that is not known yet 0, in place of another. */
 struct technique_speed *pass_speed(struct technique_ctx *ctx, uint64_t kind);
 
+/* In software two pieces are under way at a time, so that nobody waits for who hands them over, and each is to
+ * last so much of a turn. */
+#define PASS_PIECE_SHARE 0.6
+/* Hands over what was drawn since, `units` of a kind, or < 0 when that tells nothing of others, and
+ * waits for what was handed over before, and, `wait`, for this as well; learns from it. Returns what a
+ * piece took, ms; 0: not known. Elsewhere than in software it is nothing. */
+double pass_hand_over(struct technique_ctx *ctx, uint64_t kind, double units,
+    const struct gl_stopwatch *since, bool wait);
+
 /* A large drawing of triangles is cut into bands of rows, and what triangles there are in one into pieces, each as
  * long as a turn should last. */
 struct pass_bands {
@@ -26,6 +35,7 @@ struct pass_bands {
     /* Of a drawing of triangles (scene_draw), that of the band which is at hand. */
     struct cull_piece piece;
     double slowest_ms; /* of the band's pieces so far */
+    bool by_hand;      /* not by the device: what is drawn is done */
 };
 /* first_pixels: of the first band; what there is to a pixel is only known then. kind: of drawings whose
  * triangles take equally long. */

@@ -10,7 +10,7 @@
 #include <math.h>
 #include <string.h>
 
-#define MOST_AT_ONCE 8 /* maps between two looks at the time */
+#define AT_ONCE 8 /* maps that a GPU draws between two looks at the time */
 
 static float radical_inverse(uint32_t i)
 {
@@ -81,25 +81,16 @@ bool pass_sample_views(struct technique_run *run, const struct sample_view *view
 {
     GLuint framebuffer;
     bool ok = true;
-    uint32_t at_once = 1, drawn = 0;
     gl_timer_begin(&run->ctx->timer, PEN_STAGE_SHADOW, "sample maps");
     gl.CreateFramebuffers(1, &framebuffer);
-    struct gl_stopwatch since = gl_stopwatch_start();
     for (uint32_t i = 0; ok && i < count; i++) {
         const struct sample_view *view = &views[i];
         gl.NamedFramebufferTextureLayer(
             framebuffer, GL_DEPTH_ATTACHMENT, array->name, 0, (GLint)view->layer);
         ok = pass_draw_casters(
             run, framebuffer, array->width, view->point.at, view->rect, false, error);
-        if (!ok || ++drawn < at_once)
-            continue;
-        if (run->ctx->software)
-            gl.Finish();
-        double fit = drawn * run->ctx->turns.most_ms / gl_stopwatch_ms(&since);
-        at_once = (uint32_t)fmin(fmax(fit, 1), fmin(2 * at_once, MOST_AT_ONCE));
-        drawn = 0;
-        ok = pass_turn_inside(run->ctx, error);
-        since = gl_stopwatch_start();
+        if (ok && (run->ctx->software || i % AT_ONCE == AT_ONCE - 1))
+            ok = pass_turn(run->ctx, error);
     }
     gl.DeleteFramebuffers(1, &framebuffer);
     gl_timer_end(&run->ctx->timer);

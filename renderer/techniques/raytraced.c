@@ -1,21 +1,10 @@
 #include "renderer/passes/draw/screen.h"
-#include "renderer/passes/rays/rays.h"
+#include "renderer/techniques/ray_params.h"
 
 #define SHARED_ROWS "renderer/techniques/raytraced.def"
 #include "renderer/shared/rows_c.h"
 
 static const char *const weighting_names[] = {"area", "g", NULL};
-
-/* Without Embree there is no "cpu", and "auto" is "gpu". */
-enum { BACKEND_AUTO, BACKEND_GPU, BACKEND_CPU };
-static const char *const backend_names[] = {"auto", "gpu",
-#ifdef PENUMBRA_HAVE_TRACE
-    "cpu",
-#endif
-    NULL};
-
-/* Errors of several lights must not be alike, or they would not average out. */
-#define LIGHT_SEED 0x9e3779b9u
 
 struct raytraced {
     uint32_t samples;
@@ -35,16 +24,14 @@ static const struct pen_param rows[] = {
         .help = "Spends all rays only near pixels whose first 16 disagree."),
     PARAM(struct raytraced, target_error, .def = 0, .min = 0, .max = 0.5,
         .help = "Stops when a pixel's standard error is below; 0 spends all rays."),
-    PARAM(struct raytraced, seed, .def = 0, .min = 0, .max = 16777215,
-        .help = "Another number gives another, equally good set of rays."),
-    PARAM(struct raytraced, backend, .choices = backend_names,
-        .help =
-            "Where rays are traced: gpu in compute shaders, cpu by Embree where it is built in; "
-            "auto takes the GPU unless OpenGL runs on the CPU itself."),
+    SEED_ROW(struct raytraced),
+    BACKEND_ROW(struct raytraced, "Where rays are traced: gpu in compute shaders, cpu by Embree "
+                                  "where it is built in; "),
 };
 
 struct state {
     struct ray_targets targets;
+    bool on_host;
 };
 
 static void destroy(struct technique_ctx *ctx, void *state)
@@ -76,18 +63,19 @@ static bool trace(struct technique_run *run, struct pen_error *error)
         .target_error = params->target_error,
         .weighting = params->weighting,
         .adaptive = params->adaptive.on && run->face->extent[0] > 0,
-        .seed = params->seed + run->frame + LIGHT_SEED * run->light_index,
+        .seed = ray_seed(run, params->seed),
         .settle = settle};
     struct pen_error refused = {0};
+    s->on_host = ray_on_host(run, params->backend);
 #ifdef PENUMBRA_HAVE_TRACE
-    bool automatic = params->backend == BACKEND_AUTO;
-    if (params->backend == BACKEND_CPU || (automatic && run->ctx->software))
+    if (s->on_host)
         return pass_rays_host(run, &job, &s->targets, error);
 #endif
     if (pass_rays_device(run, &job, &s->targets, &refused))
         return true;
 #ifdef PENUMBRA_HAVE_TRACE
-    if (automatic && refused.code == PEN_TOO_BIG) {
+    if (params->backend == BACKEND_AUTO && refused.code == PEN_TOO_BIG) {
+        s->on_host = true;
         pen_result_warn(run->result, "Rays were traced on the CPU. %s", refused.message);
         return pass_rays_host(run, &job, &s->targets, error);
     }
@@ -102,19 +90,22 @@ static bool record(struct technique_run *run, struct pen_error *error)
     if (run->face == &run->light->faces[0] && !trace(run, error))
         return false;
     run->work_counted = true;
-    if (!settle(run, error))
+    bool settled = false;
+#ifdef PENUMBRA_HAVE_TRACE
+    settled = s->on_host && ray_host_settles(run);
+#endif
+    if (!settled && !settle(run, error))
         return false;
     if (!run->variance_framebuffer)
         return true;
-    struct pass_texture traced[] = {
-        {UNIT_TRACED, s->targets.visibility.texture.name, GL_SAMPLE_NEAREST},
-        {UNIT_TRACED_ERROR, s->targets.standard_error.texture.name, GL_SAMPLE_NEAREST}};
+    struct pass_texture traced = {
+        UNIT_TRACED_ERROR, s->targets.standard_error.texture.name, GL_SAMPLE_NEAREST};
     return pass_screen(run,
         &(struct pass_screen){.name = "trace variance",
             .body = "raytraced.glsl",
             .defines = "#define VARIANCE\n",
-            .textures = traced,
-            .texture_count = 2,
+            .textures = &traced,
+            .texture_count = 1,
             .framebuffer = run->variance_framebuffer,
             .add = true},
         error);

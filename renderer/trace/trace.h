@@ -7,6 +7,7 @@
  * and so do those behind it of what is left. Textures are read at their finest level. */
 #pragma once
 #include "renderer/blob/pscene.h"
+#include <math.h>
 
 /* World-space triangles, and the hierarchies that the last few lights needed: one for all of them
  * or, front_only, one per light, because it leaves out the triangles that turn their back to it. One
@@ -74,6 +75,20 @@ void pen_trace_kept_destroy(struct pen_trace_kept *kept); /* NULL is fine */
 
 enum pen_trace_step { PEN_TRACE_GO_ON, PEN_TRACE_SHOW, PEN_TRACE_STOP };
 
+/* Receivers as a camera's picture has them: pixel (x, y) shows eye + (first + x right + y down) / depth,
+ * and nothing where its depth is 0. */
+struct pen_trace_view {
+    const float *depths; /* reversed: one over the distance along the view axis, in any unit */
+    const uint16_t
+        *normals; /* four each: octahedral geometric normal of [0, 65535], two not read */
+    float first[3], right[3], down[3];
+};
+
+/* Where receiver `pixel` of a picture of that width is, and its geometric normal, of any length; false
+ * where there is none. */
+bool pen_trace_view_read(const struct pen_trace_view *view, const float eye[3], uint32_t width,
+    uint32_t pixel, float position[3], float normal[3]);
+
 /* Receivers, and how they are sampled. Receivers are in rows: neighbours in the image should be
  * neighbours here. A receiver whose normal is (0,0,0) is none: it costs nothing and is lit. */
 struct pen_trace_job {
@@ -81,13 +96,14 @@ struct pen_trace_job {
     const float *normals;     /* geometric, towards the side that is seen; any length */
     uint32_t position_stride; /* floats from one receiver to the next; 0: 3 */
     uint32_t normal_stride;
-    uint32_t width, height; /* count = width * height; height 1 for a list */
-    uint32_t samples;       /* per receiver, at most; rounded up to a power of two, 1 .. 65536 */
-    float target_error;     /* stop when the standard error is below; 0: always all samples */
-    uint32_t weighting;     /* enum pen_trace_weighting */
-    bool front_only;        /* single-sided triangles cast only to their front */
-    bool adaptive;          /* all samples only near receivers whose pre-test is mixed */
-    uint32_t dilation;      /* of that neighbourhood, receivers; 0: 4 */
+    const struct pen_trace_view *view; /* or NULL; then positions and normals are not read */
+    uint32_t width, height;            /* count = width * height; height 1 for a list */
+    uint32_t samples;   /* per receiver, at most; rounded up to a power of two, 1 .. 65536 */
+    float target_error; /* stop when the standard error is below; 0: always all samples */
+    uint32_t weighting; /* enum pen_trace_weighting */
+    bool front_only;    /* single-sided triangles cast only to their front */
+    bool adaptive;      /* all samples only near receivers whose pre-test is mixed */
+    uint32_t dilation;  /* of that neighbourhood, receivers; 0: 4 */
     /* Ray origins are lifted along the normal by the larger of `bias` (m) and 2^-18 of the size of
      * the coordinates (their rounding). Positions from a depth buffer err along the way from `eye`,
      * which is free: they are brought back on it, where no surface that touches theirs can be jumped
@@ -149,6 +165,22 @@ struct pen_trace_stats {
 bool pen_trace_visibility(struct pen_trace_scene *scene, const struct pen_trace_light *light,
     const struct pen_trace_job *job, const struct pen_trace_result *result,
     struct pen_trace_stats *stats, struct pen_error *error);
+
+/* The half float next to x, which is at least 0. */
+static inline uint16_t pen_trace_half(float x)
+{
+    union {
+        float value;
+        uint32_t bits;
+    } f = {fminf(x, 65504.0f)};
+    if (f.value < 0x1p-14f) /* subnormal: its unit is 2^-24 */
+        return (uint16_t)(f.value * 0x1p24f + 0.5f);
+    return (uint16_t)((f.bits - 0x38000000u + 0xfffu + (f.bits >> 13 & 1)) >> 13);
+}
+
+/* Share of an emitter's area where middle + x across + y along > 0: x and y in [-1, 1], or on the unit
+ * disk when it is round. */
+float pen_trace_horizon_share(float middle, float across, float along, bool round);
 
 /* A pinhole camera: unit axes, +forward into the picture. */
 struct pen_trace_camera {

@@ -61,6 +61,7 @@ FLOORS = {
         ["gl", "trace", "encode", "generate", "import/base", "import/bundle",
          "import/draco"],
         ["trace/embree"],
+        ["trace/denoise"],
         ["import/names"], ["import/files"], ["import/image", "import/document"],
         ["import/geometry"],
         ["import/convert"], ["import/motion"], ["import/convert/node"], ["import/convert/convert"],

@@ -50,14 +50,19 @@ struct picture {
     uint32_t instances[PIXELS], triangles[PIXELS], samples[PIXELS];
 };
 
+static struct pen_trace_camera camera(void)
+{
+    return pen_trace_camera_look_at((const float[]){2, 2, 3}, (const float[]){0, 0.4f, 0},
+        (const float[]){0, 1, 0}, 45, WIDTH, HEIGHT);
+}
+
 static struct picture *take_picture(struct pen_trace_scene *scene)
 {
     struct picture *p = calloc(1, sizeof *p);
-    struct pen_trace_camera camera = pen_trace_camera_look_at((const float[]){2, 2, 3},
-        (const float[]){0, 0.4f, 0}, (const float[]){0, 1, 0}, 45, WIDTH, HEIGHT);
+    struct pen_trace_camera from = camera();
     struct pen_trace_hits hits = {p->positions[0], p->normals[0], p->instances, p->triangles};
     struct pen_error error = {0};
-    CHECK(pen_trace_primary(scene, &camera, 0, &hits, &error));
+    CHECK(pen_trace_primary(scene, &from, 0, &hits, &error));
     return p;
 }
 
@@ -290,19 +295,18 @@ static void test_primary(struct pen_trace_scene *scene, const struct picture *p)
     }
     CHECK(ball > PIXELS / 20 && ground > PIXELS / 10);
     /* Every pixel's place projects to the pixel: seen from the eye, the picture's axes hold. */
-    struct pen_trace_camera camera = pen_trace_camera_look_at((const float[]){2, 2, 3},
-        (const float[]){0, 0.4f, 0}, (const float[]){0, 1, 0}, 45, WIDTH, HEIGHT);
+    struct pen_trace_camera seen_by = camera();
     for (int i = 0; i < PIXELS; i += 37) {
         float d[3];
         for (int c = 0; c < 3; c++)
-            d[c] = p->positions[i][c] - camera.eye[c];
+            d[c] = p->positions[i][c] - seen_by.eye[c];
         if (p->instances[i] == PEN_TRACE_NONE)
             continue;
-        double focal = HEIGHT / 2.0 / tan(M_PI / 8), z = (double)trace_dot(d, camera.forward);
+        double focal = HEIGHT / 2.0 / tan(M_PI / 8), z = (double)trace_dot(d, seen_by.forward);
         CHECK_NEAR(
-            WIDTH / 2.0 + focal * (double)trace_dot(d, camera.right) / z, i % WIDTH + 0.5, 0.01);
+            WIDTH / 2.0 + focal * (double)trace_dot(d, seen_by.right) / z, i % WIDTH + 0.5, 0.01);
         CHECK_NEAR(
-            HEIGHT / 2.0 - focal * (double)trace_dot(d, camera.up) / z, i / WIDTH + 0.5, 0.01);
+            HEIGHT / 2.0 - focal * (double)trace_dot(d, seen_by.up) / z, i / WIDTH + 0.5, 0.01);
     }
     (void)scene;
     (void)sky;
@@ -501,6 +505,73 @@ static void test_turns(void)
     free(guests.picture);
 }
 
+/* As octahedral.glsl has it. */
+static void encode_normal(const float n[3], uint16_t e[4])
+{
+    float sum = fabsf(n[0]) + fabsf(n[1]) + fabsf(n[2]), x = n[0] / sum, y = n[1] / sum;
+    float folded_x = (1 - fabsf(y)) * (x >= 0 ? 1 : -1),
+          folded_y = (1 - fabsf(x)) * (y >= 0 ? 1 : -1);
+    e[0] = (uint16_t)lrintf(65535 * (0.5f * (n[2] >= 0 ? x : folded_x) + 0.5f));
+    e[1] = (uint16_t)lrintf(65535 * (0.5f * (n[2] >= 0 ? y : folded_y) + 0.5f));
+}
+
+/* A camera's depths and normals are the receivers that they were made of. */
+static void test_view(struct pen_trace_scene *scene, const struct picture *p)
+{
+    static float depths[PIXELS];
+    static uint16_t normals[PIXELS][4];
+    struct pen_trace_camera c = camera();
+    struct pen_trace_view view = {.depths = depths, .normals = normals[0]};
+    struct picture *other = take_picture(scene), *same = take_picture(scene);
+    float scale = 2 * c.tan_half_fov_y / HEIGHT, near_z = 0.25f;
+    for (int k = 0; k < 3; k++) {
+        view.right[k] = near_z * scale * c.right[k];
+        view.down[k] = -near_z * scale * c.up[k];
+        view.first[k] = near_z * c.forward[k] - 0.5f * (WIDTH - 1) * view.right[k] -
+                        0.5f * (HEIGHT - 1) * view.down[k];
+    }
+    for (uint32_t i = 0; i < PIXELS; i++) {
+        float to[3], distance = 0, position[3], normal[3];
+        for (int k = 0; k < 3; k++) {
+            to[k] = p->positions[i][k] - c.eye[k];
+            distance += to[k] * c.forward[k];
+        }
+        bool hit = p->instances[i] != PEN_TRACE_NONE;
+        depths[i] = hit ? near_z / distance : 0;
+        if (hit)
+            encode_normal(p->normals[i], normals[i]);
+        CHECK(pen_trace_view_read(&view, c.eye, WIDTH, i, position, normal) == hit);
+        float length = hit ? sqrtf(trace_dot(normal, normal)) : 1;
+        for (int k = 0; k < 3 && hit; k++) {
+            CHECK_NEAR(position[k], p->positions[i][k], 1e-4);
+            CHECK_NEAR(normal[k] / length, p->normals[i][k], 1e-4);
+        }
+    }
+    struct pen_trace_light light = downward_light(PEN_TRACE_DISK, 0.4f);
+    struct pen_trace_job job = job_for(p, 256);
+    memcpy(job.eye, c.eye, sizeof job.eye);
+    job.bias = 1e-3f;
+    run(scene, &light, &job, same);
+    job.positions = job.normals = NULL;
+    job.view = &view;
+    run(scene, &light, &job, other);
+    double sum = 0;
+    for (uint32_t i = 0; i < PIXELS; i++)
+        sum += pow((double)same->visibility[i][3] - (double)other->visibility[i][3], 2);
+    CHECK(sqrt(sum / PIXELS) < 0.003);
+    free(other);
+    free(same);
+}
+
+/* Halves are those next to their numbers. */
+static void test_half(void)
+{
+    CHECK(pen_trace_half(0) == 0 && pen_trace_half(1) == 0x3c00 && pen_trace_half(0.5f) == 0x3800);
+    CHECK(pen_trace_half(0x1p-24f) == 1 && pen_trace_half(0x1p-14f) == 0x0400);
+    CHECK(pen_trace_half(1e9f) == 0x7bff && pen_trace_half(0x1.002p0f) == 0x3c00);
+    CHECK(pen_trace_half(0x1.ffep-1f) == 0x3c00 && pen_trace_half(1.0f / 3) == 0x3555);
+}
+
 int main(void)
 {
     test_nets();
@@ -514,6 +585,8 @@ int main(void)
     test_target(scene, picture);
     test_weighting();
     test_depth_error(scene, picture);
+    test_view(scene, picture);
+    test_half();
     test_spot(scene);
     test_refusals(scene, picture);
     free(picture);

@@ -26,6 +26,8 @@ struct pen_trace_light ray_light(const struct technique_run *run)
         [PEN_LIGHT_SPOT] = PEN_TRACE_POINT};
     const struct light *light = run->light;
     struct pen_trace_light t = {.type = types[light->source->type], .cos_cone = -1};
+    if (light->source->type == PEN_LIGHT_SPOT)
+        t.cos_cone = 0; /* nothing behind its plane is lit; shading knows its cone */
     memcpy(t.origin, light->origin, sizeof t.origin);
     memcpy(t.x, light->x, sizeof t.x);
     memcpy(t.y, light->y, sizeof t.y);

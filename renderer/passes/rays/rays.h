@@ -19,6 +19,13 @@ struct ray_job {
     bool (*settle)(struct technique_run *run, struct pen_error *error);
 };
 
+/* Few rays on the host, and a filter: see renderer/trace/denoise/denoised.h. */
+struct ray_denoising {
+    uint32_t samples, refine;
+    float budget;
+    uint32_t seed;
+};
+
 /* What a light's rays leave, and room to work in; kept between frames. Zero to start. */
 struct ray_targets {
     struct gl_target visibility;       /* RGBA32F: rgb mean of e V, a mean of V */
@@ -37,10 +44,15 @@ float ray_aim_error(const struct technique_run *run);
 /* Fills targets->receivers from the G-buffer. */
 bool ray_receivers(struct technique_run *run, struct ray_targets *targets, struct pen_error *error);
 
-/* Fill targets->visibility and standard_error, and count rays and receivers into run->result. */
+/* Fill targets->visibility and, the host where somebody asks, standard_error, and count rays and
+ * receivers into run->result. The host fills vis instead where ray_host_settles: of one face. */
 #ifdef PENUMBRA_HAVE_TRACE
 bool pass_rays_host(struct technique_run *run, const struct ray_job *job,
     struct ray_targets *targets, struct pen_error *error);
+bool ray_host_settles(const struct technique_run *run);
+/* Fills vis, for all faces. */
+bool pass_rays_denoised(
+    struct technique_run *run, const struct ray_denoising *how, struct pen_error *error);
 #endif
 bool pass_rays_device(struct technique_run *run, const struct ray_job *job,
     struct ray_targets *targets, struct pen_error *error);

@@ -1,10 +1,12 @@
-/* Rays on the CPU: read the receivers back, trace, upload. */
+/* Rays on the CPU: read depths and normals back, trace, upload what is visible. */
 #include "protocol/container.h"
 #include "protocol/memory.h"
 #include "renderer/passes/draw/kept_sums.h"
 #include "renderer/passes/draw/show.h"
 #include "renderer/passes/draw/turn.h"
+#include "renderer/passes/rays/host_picture.h"
 #include "renderer/passes/rays/rays.h"
+#include "renderer/trace/denoise/denoised.h"
 #include "renderer/trace/points.h"
 #include <stdlib.h>
 #include <string.h>
@@ -68,26 +70,12 @@ static float *read_emission(const struct technique_run *run, struct pen_trace_li
     return texels;
 }
 
-static void read_texture(const struct gl_texture *texture, float *to)
-{
-    GLsizei bytes = (GLsizei)(16 * texture->width * texture->height);
-    gl.PixelStorei(GL_PACK_ALIGNMENT, 1);
-    gl.GetTextureImage(texture->name, 0, GL_RGBA, GL_FLOAT, bytes, to);
-}
-
-static void write_target(const struct technique_run *run, struct gl_target *target, GLenum format,
-    GLenum layout, const float *from)
-{
-    gl_target_fit(target, format, run->width, run->height, 0, 1);
-    gl.TextureSubImage2D(target->texture.name, 0, 0, 0, (GLsizei)run->width, (GLsizei)run->height,
-        layout, GL_FLOAT, from);
-}
-
 struct waiting {
     struct technique_run *run;
     const struct ray_job *job;
     struct ray_targets *targets;
     const struct pen_trace_result *result;
+    const struct host_picture *picture;
     struct pen_error *error;
 };
 
@@ -105,13 +93,25 @@ static enum pen_trace_step step(void *context, uint32_t done, uint32_t total)
     return steps[pass_step(w->run, done, total)];
 }
 
+static void write_target(const struct technique_run *run, struct gl_target *target, GLenum format,
+    GLenum layout, const float *from)
+{
+    gl_target_fit(target, format, run->width, run->height, 0, 1);
+    gl.TextureSubImage2D(target->texture.name, 0, 0, 0, (GLsizei)run->width, (GLsizei)run->height,
+        layout, GL_FLOAT, from);
+}
+
 static void write_result(const struct waiting *w)
 {
     struct technique_run *run = w->run;
-    write_target(run, &w->targets->visibility, GL_RGBA32F, GL_RGBA, w->result->visibility);
-    gl_target_fit(&w->targets->standard_error, GL_R32F, run->width, run->height, 0, 1);
-    if (w->result->standard_error)
-        write_target(run, &w->targets->standard_error, GL_R32F, GL_RED, w->result->standard_error);
+    const struct pen_trace_result *result = w->result;
+    if (ray_host_settles(run))
+        host_picture_settle(
+            run, w->picture, w->job->weighting == PEN_TRACE_AREA, result->visibility);
+    else
+        write_target(run, &w->targets->visibility, GL_RGBA32F, GL_RGBA, result->visibility);
+    if (result->standard_error)
+        write_target(run, &w->targets->standard_error, GL_R32F, GL_RED, result->standard_error);
 }
 
 static bool show(void *context)
@@ -120,7 +120,8 @@ static bool show(void *context)
     struct gl_timer *timer = &w->run->ctx->timer;
     gl_timer_end(timer);
     write_result(w);
-    bool ok = w->job->settle(w->run, w->error) && pass_show(w->run, w->error);
+    bool settled = ray_host_settles(w->run) || w->job->settle(w->run, w->error);
+    bool ok = settled && pass_show(w->run, w->error);
     gl_timer_begin(timer, PEN_STAGE_TECHNIQUE, "trace");
     return ok;
 }
@@ -144,42 +145,54 @@ static struct kept_sum *open_kept(struct technique_run *run, const struct ray_jo
     return kept;
 }
 
+/* What all jobs have of a frame. */
+static struct pen_trace_job make_job(
+    const struct technique_run *run, const struct host_picture *picture, struct waiting *waiting)
+{
+    struct pen_trace_job job = {.view = &picture->view,
+        .width = run->width,
+        .height = run->height,
+        .front_only = run->request->casters == PEN_CASTERS_FRONT,
+        .depth_error = RAY_DEPTH_ERROR,
+        .aim_error = ray_aim_error(run)};
+    memcpy(job.eye, run->view->eye, sizeof job.eye);
+    if (run->ctx->turns.fiber) {
+        job.turn = turn;
+        job.turn_context = waiting;
+        job.turn_ms = run->ctx->turns.most_ms;
+    }
+    return job;
+}
+
+bool ray_host_settles(const struct technique_run *run)
+{
+    return run->light->face_count == 1;
+}
+
 bool pass_rays_host(struct technique_run *run, const struct ray_job *job, struct ray_targets *t,
     struct pen_error *error)
 {
     struct pen_trace_scene *scene = trace_scene(run, error);
-    if (!scene || !ray_receivers(run, t, error))
+    if (!scene)
         return false;
     size_t count = (size_t)run->width * run->height;
-    float *positions = pen_alloc(count, 16), *normals = pen_alloc(count, 16);
+    struct host_picture picture;
     float *visibility = pen_alloc(count, 16), *standard_error = pen_alloc(count, 4);
     struct pen_trace_light light = ray_light(run);
     float *emission = read_emission(run, &light);
-    struct pen_trace_job trace = {.positions = positions,
-        .normals = normals,
-        .position_stride = 4,
-        .normal_stride = 4,
-        .width = run->width,
-        .height = run->height,
-        .samples = job->samples,
-        .target_error = job->target_error,
-        .weighting = job->weighting,
-        .front_only = run->request->casters == PEN_CASTERS_FRONT,
-        .adaptive = job->adaptive,
-        .depth_error = RAY_DEPTH_ERROR,
-        .aim_error = ray_aim_error(run),
-        .seed = job->seed};
-    memcpy(trace.eye, run->view->eye, sizeof trace.eye);
     bool wants_error = run->variance_framebuffer != 0;
     struct pen_trace_result result = {
         .visibility = visibility, .standard_error = wants_error ? standard_error : NULL};
-    struct waiting waiting = {run, job, t, &result, error};
-    if (run->ctx->turns.fiber) {
-        trace.turn = turn;
+    struct waiting waiting = {run, job, t, &result, &picture, error};
+    struct pen_trace_job trace = make_job(run, &picture, &waiting);
+    trace.samples = job->samples;
+    trace.target_error = job->target_error;
+    trace.weighting = job->weighting;
+    trace.adaptive = job->adaptive;
+    trace.seed = job->seed;
+    if (trace.turn) {
         trace.step = step;
         trace.show = show;
-        trace.turn_context = &waiting;
-        trace.turn_ms = run->ctx->turns.most_ms;
     }
     struct pen_trace_stats stats;
     struct kept_sum *kept = open_kept(run, job);
@@ -189,8 +202,7 @@ bool pass_rays_host(struct technique_run *run, const struct ray_job *job, struct
         kept->samples = 0;
         trace.kept = &gathered;
     }
-    read_texture(&t->receivers[0].texture, positions);
-    read_texture(&t->receivers[1].texture, normals);
+    host_picture_read(run, &picture);
     gl_timer_begin(&run->ctx->timer, PEN_STAGE_TECHNIQUE, "trace");
     bool ok = pen_trace_visibility(scene, &light, &trace, &result, &stats, error);
     gl_timer_end(&run->ctx->timer);
@@ -204,10 +216,43 @@ bool pass_rays_host(struct technique_run *run, const struct ray_job *job, struct
         run->result->rays += stats.rays;
         run->result->full_work_pixels += (uint32_t)stats.full_receivers;
     }
-    free(positions);
-    free(normals);
+    host_picture_finish(&picture);
     free(visibility);
     free(standard_error);
+    free(emission);
+    return ok && pass_turn(run->ctx, error);
+}
+
+bool pass_rays_denoised(
+    struct technique_run *run, const struct ray_denoising *how, struct pen_error *error)
+{
+    struct pen_trace_scene *scene = trace_scene(run, error);
+    struct waiting waiting = {.run = run, .error = error};
+    struct host_picture picture;
+    struct pen_trace_stats stats;
+    if (!scene)
+        return false;
+    uint16_t *halves = pen_alloc((size_t)run->width * run->height, 4 * sizeof *halves);
+    struct pen_trace_light light = ray_light(run);
+    float *emission = read_emission(run, &light);
+    struct pen_trace_job job = make_job(run, &picture, &waiting);
+    job.samples = how->samples;
+    job.seed = how->seed;
+    gl_timer_begin(&run->ctx->timer, PEN_STAGE_TECHNIQUE, "read back");
+    host_picture_read(run, &picture);
+    gl_timer_end(&run->ctx->timer);
+    gl_timer_begin(&run->ctx->timer, PEN_STAGE_TECHNIQUE, "trace");
+    bool ok = pen_trace_denoised(scene, &light, &job,
+        &(struct pen_trace_denoising){how->refine, how->budget}, halves, &stats, error);
+    gl_timer_end(&run->ctx->timer);
+    count_memory(run, scene);
+    if (ok) {
+        host_picture_write(run, halves);
+        run->result->rays += stats.rays;
+        run->result->full_work_pixels += (uint32_t)stats.full_receivers;
+    }
+    host_picture_finish(&picture);
+    free(halves);
     free(emission);
     return ok && pass_turn(run->ctx, error);
 }

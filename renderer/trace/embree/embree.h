@@ -1,5 +1,6 @@
 /* Embree 3 or 4, whichever CMake has found: what differs between them, under names of ours. */
 #pragma once
+#include <stdbool.h>
 #if PENUMBRA_EMBREE >= 4
 #include <embree4/rtcore.h>
 #else
@@ -16,13 +17,13 @@ static inline void embree_context_init(embree_context *context)
     rtcInitRayQueryContext(context);
 }
 
-/* Sixteen rays from one eye, to what they hit first. */
-static inline void embree_intersect16(
-    const int *valid, RTCScene scene, embree_context *context, struct RTCRayHit16 *rays)
+/* Sixteen rays to what they hit first; coherent: from one eye. */
+static inline void embree_intersect16(const int *valid, RTCScene scene, embree_context *context,
+    struct RTCRayHit16 *rays, bool coherent)
 {
     struct RTCIntersectArguments arguments;
     rtcInitIntersectArguments(&arguments);
-    arguments.flags = RTC_RAY_QUERY_FLAG_COHERENT;
+    arguments.flags = coherent ? RTC_RAY_QUERY_FLAG_COHERENT : RTC_RAY_QUERY_FLAG_INCOHERENT;
     arguments.context = context;
     rtcIntersect16(valid, scene, rays, &arguments);
 }
@@ -47,10 +48,11 @@ static inline void embree_context_init(embree_context *context)
     rtcInitIntersectContext(context);
 }
 
-static inline void embree_intersect16(
-    const int *valid, RTCScene scene, embree_context *context, struct RTCRayHit16 *rays)
+static inline void embree_intersect16(const int *valid, RTCScene scene, embree_context *context,
+    struct RTCRayHit16 *rays, bool coherent)
 {
-    context->flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+    context->flags =
+        coherent ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
     rtcIntersect16(valid, scene, context, rays);
 }
 

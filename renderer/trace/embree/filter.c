@@ -62,7 +62,7 @@ float trace_alpha_at(const struct trace_alpha *alpha, uint32_t primitive, float 
 }
 
 /* Embree hands packets of any width N as rows of N numbers; its accessors are C++ only. */
-enum ray_row { RAY_DIR_X = 4, RAY_DIR_Y, RAY_DIR_Z, RAY_ID = 10 };
+enum ray_row { RAY_DIR_X = 4, RAY_DIR_Y, RAY_DIR_Z, RAY_FAR = 8, RAY_ID = 10 };
 enum hit_row { HIT_NG_X, HIT_NG_Y, HIT_NG_Z, HIT_U, HIT_V, HIT_PRIMITIVE };
 
 static inline float float_at(const void *rows, uint32_t row, uint32_t n, uint32_t i)
@@ -94,8 +94,10 @@ static inline void filter_facing(const struct RTCFilterFunctionNArguments *args,
 
 /* What is left of the light of the shadow ray that is called `id`, behind a surface. Embree asks
  * once about a ray and a triangle, since its hierarchies of medium quality refer to each once. */
-static bool dims_to_nothing(struct trace_context *context, uint32_t id, float alpha)
+static bool dims_to_nothing(struct trace_context *context, uint32_t id, float alpha, float distance)
 {
+    if (alpha > 0)
+        context->nearest[id] = fminf(context->nearest[id], distance);
     context->share[id] *= 1 - fminf(fmaxf(alpha, 0), 1);
     if (context->share[id] >= TRACE_LEAST_SHARE)
         return false;
@@ -121,7 +123,8 @@ static inline void filter_alpha(const struct RTCFilterFunctionNArguments *args, 
             float a = trace_alpha_at(alpha, primitive, float_at(args->hit, HIT_U, n, i),
                 float_at(args->hit, HIT_V, n, i));
             if (m->blend && end)
-                counts = dims_to_nothing((struct trace_context *)args->context, id, a);
+                counts = dims_to_nothing((struct trace_context *)args->context, id, a,
+                    float_at(args->ray, RAY_FAR, n, i));
             else if (m->blend) /* a share alpha of the eye's rays see it */
                 counts =
                     a >= ((float)(trace_hash(id + primitive * 0x9e3779b9u) >> 8) + 0.5f) * 0x1p-24f;

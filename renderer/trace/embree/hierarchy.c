@@ -63,13 +63,16 @@ static bool add_geometry(struct pen_trace_scene *scene, struct trace_hierarchy *
         geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, positions, 0, 12, vertices);
     rtcSetSharedGeometryBuffer(
         geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, indices, 0, 12, triangles);
+    bool eye = h->light.shape == TRACE_EYE; /* else all rays are shadow rays */
     if (id == TRACE_GEOMETRY_MIXED) {
         rtcSetGeometryOccludedFilterFunction(geometry, trace_filter_facing_shadow);
-        rtcSetGeometryIntersectFilterFunction(geometry, trace_filter_facing_primary);
+        rtcSetGeometryIntersectFilterFunction(
+            geometry, eye ? trace_filter_facing_primary : trace_filter_facing_shadow);
     } else if (id == TRACE_GEOMETRY_ALPHA) {
         rtcSetGeometryUserData(geometry, &h->filter);
         rtcSetGeometryOccludedFilterFunction(geometry, trace_filter_alpha_shadow);
-        rtcSetGeometryIntersectFilterFunction(geometry, trace_filter_alpha_primary);
+        rtcSetGeometryIntersectFilterFunction(
+            geometry, eye ? trace_filter_alpha_primary : trace_filter_alpha_shadow);
     }
     rtcCommitGeometry(geometry);
     rtcAttachGeometryByID(h->scene, geometry, id);

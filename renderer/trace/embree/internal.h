@@ -102,12 +102,21 @@ struct pen_trace_scene {
     _Atomic int64_t bytes; /* everything */
     atomic_bool over_budget;
     struct pen_trace_scene_info info;
+    void *scratch; /* room of a job that has ended, for the next */
+    size_t scratch_bytes;
 };
+
+/* Room for a job to work in, which counts as the scene's. *bytes becomes what it has. NULL: there is
+ * none. */
+void *trace_scratch_take(struct pen_trace_scene *scene, size_t *bytes);
+void trace_scratch_give(struct pen_trace_scene *scene, void *scratch, size_t bytes);
 
 /* The context of a query: Embree's own first, so that filters can cast back. */
 struct trace_context {
     embree_context embree;
-    float share[16]; /* of a shadow ray's light that blended surfaces let through, by its id */
+    /* Of a shadow ray, by its id: what blended surfaces let through of its light, and where the
+     * nearest of them is. */
+    float share[16], nearest[16];
 };
 
 /* Filters: shadow rays run from the receiver to the light, primary rays from the eye. */
@@ -141,6 +150,20 @@ struct trace_work {
 /* On `threads` threads, the caller's among them, with denormals flushed. Adds their processor time to
  * *cpu_seconds. False: a turn said so, and items are left out. */
 bool trace_parallel(uint32_t threads, const struct trace_work *work, double *cpu_seconds);
+
+/* A job's work on the tiles of its picture: what it works on begins with this. */
+struct trace_pieces {
+    struct pen_trace_scene *scene;
+    const struct pen_trace_job *job;
+    uint32_t threads;
+    double cpu_seconds; /* so far */
+    atomic_bool late;   /* there is no more wanted */
+};
+/* Calls work(pieces, tile) for all tiles; now and then others come in between when they want to. False:
+ * it is late. */
+bool trace_in_pieces(
+    struct trace_pieces *pieces, uint32_t tiles, void (*work)(void *context, uint32_t item));
+bool trace_is_late(struct trace_pieces *pieces); /* also by the job's deadline */
 /* `threads`, or how many this process may use when that is 0. */
 uint32_t trace_thread_count(uint32_t threads);
 double trace_seconds(void);

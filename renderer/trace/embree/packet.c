@@ -128,15 +128,17 @@ void trace_packet_load(struct trace_packet *p, const struct trace_emitter *e,
     }
 }
 
-/* Directions to one sample; returns how many lanes have it in front. */
+/* Directions to one sample of all lanes, or (TRACE_OWN_POINTS) to one of each; returns how many lanes
+ * have it in front. */
 static inline __attribute__((always_inline)) int aim(struct trace_packet *p,
-    const struct trace_emitter *e, int32_t su, int32_t sv, bool shifted, bool disk, bool own_frame,
-    bool sun, float u[LANES], float v[LANES], int32_t valid[LANES])
+    const struct trace_emitter *e, const int32_t *su, const int32_t *sv, uint32_t mode, bool disk,
+    bool own_frame, bool sun, float u[LANES], float v[LANES], int32_t valid[LANES])
 {
     int valid_count = 0;
+    bool own = mode & TRACE_OWN_POINTS, shifted = !(mode & (TRACE_UNSHIFTED | TRACE_OWN_POINTS));
     for (int l = 0; l < LANES; l++) {
-        float pu = (float)(shifted ? su ^ p->shift_u[l] : su) * 0x1p-31f;
-        float pv = (float)(shifted ? sv ^ p->shift_v[l] : sv) * 0x1p-31f;
+        float pu = (float)(own ? su[l] : shifted ? *su ^ p->shift_u[l] : *su) * 0x1p-31f;
+        float pv = (float)(own ? sv[l] : shifted ? *sv ^ p->shift_v[l] : *sv) * 0x1p-31f;
         if (disk)
             disk_point(&pu, &pv);
         u[l] = pu;
@@ -186,6 +188,14 @@ static void add_weighted(struct trace_packet *p, const struct trace_emitter *e, 
         }
 }
 
+static void clear_shares(struct trace_context *query)
+{
+    for (int l = 0; l < LANES; l++) {
+        query->share[l] = 1;
+        query->nearest[l] = INFINITY;
+    }
+}
+
 static inline __attribute__((always_inline)) void run(const struct trace_emitter *e,
     struct trace_packet *p, const struct trace_block *block, uint32_t mode, struct trace_sums *sums,
     bool disk, bool own_frame, bool sun)
@@ -196,19 +206,21 @@ static inline __attribute__((always_inline)) void run(const struct trace_emitter
     float share[LANES] = {0}, last_share[LANES] = {0};
     int32_t valid[LANES] __attribute__((aligned(64)));
     int32_t seen[LANES], last[LANES] = {0}, count[LANES] = {0}, pairs[LANES] = {0};
+    int32_t above[LANES] = {0};
+    uint32_t stride = mode & TRACE_OWN_POINTS ? LANES : 1;
     for (uint32_t i = 0; i < block->count; i++) {
-        int in_front = aim(p, e, block->u[i], block->v[i], !(mode & TRACE_UNSHIFTED), disk,
+        int in_front = aim(p, e, block->u + stride * i, block->v + stride * i, mode, disk,
             own_frame, sun, u, v, valid);
         if (in_front && !(mode & TRACE_ASSUME_VISIBLE)) {
             if (mode & TRACE_SHARES)
-                for (int l = 0; l < LANES; l++)
-                    query.share[l] = 1;
+                clear_shares(&query);
             embree_occluded16(valid, e->scene, &query.embree, &p->ray);
             sums->rays += (uint32_t)in_front;
         }
         for (int l = 0; l < LANES; l++) {
             seen[l] = p->ray.tfar[l] > 0 ? valid[l] : 0;
             share[l] = (float)-seen[l];
+            above[l] -= valid[l];
         }
         if ((mode & TRACE_SHARES) && in_front && !(mode & TRACE_ASSUME_VISIBLE))
             for (int l = 0; l < LANES; l++) {
@@ -235,6 +247,7 @@ static inline __attribute__((always_inline)) void run(const struct trace_emitter
     }
     for (int l = 0; l < LANES; l++) {
         sums->count[l] += (uint32_t)count[l];
+        sums->above[l] += (uint32_t)above[l];
         sums->pairs[l] += (float)pairs[l];
     }
 }
@@ -256,5 +269,33 @@ void trace_packet_run(const struct trace_emitter *e, struct trace_packet *p,
         break;
     default: /* a point is a rectangle without extent */
         run(e, p, block, mode, sums, false, false, false);
+    }
+}
+
+void trace_packet_nearest(const struct trace_emitter *e, struct trace_packet *p,
+    const int32_t u[LANES], const int32_t v[LANES], struct trace_nearest *out)
+{
+    struct trace_context query;
+    struct RTCRayHit16 ray;
+    float at_u[LANES], at_v[LANES];
+    bool round = e->type == PEN_TRACE_DISK || e->type == PEN_TRACE_SPHERE,
+         sun = e->type == PEN_TRACE_SUN;
+    int in_front = 0;
+    embree_context_init(&query.embree);
+    clear_shares(&query);
+    memset(out->above, 0, sizeof out->above);
+    if (p->any_active)
+        in_front = aim(p, e, u, v, TRACE_OWN_POINTS, round || sun, e->type == PEN_TRACE_SPHERE, sun,
+            at_u, at_v, out->above);
+    memcpy(&ray.ray, &p->ray, sizeof ray.ray);
+    for (int l = 0; l < LANES; l++)
+        ray.hit.geomID[l] = ray.hit.instID[0][l] = RTC_INVALID_GEOMETRY_ID;
+    if (in_front)
+        embree_intersect16(out->above, e->scene, &query.embree, &ray, false);
+    out->rays = (uint32_t)in_front;
+    for (int l = 0; l < LANES; l++) {
+        bool hit = out->above[l] && ray.hit.geomID[l] != RTC_INVALID_GEOMETRY_ID;
+        out->share[l] = hit || !out->above[l] ? 0 : query.share[l];
+        out->distance[l] = fminf(hit ? ray.ray.tfar[l] : INFINITY, query.nearest[l]);
     }
 }

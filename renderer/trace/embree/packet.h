@@ -38,6 +38,7 @@ struct trace_packet {
  * or 1, or with TRACE_SHARES the share of its light that blended surfaces let through. */
 struct trace_sums {
     uint32_t count[TRACE_LANES]; /* wholly visible samples */
+    uint32_t above[TRACE_LANES]; /* samples above the receiver's horizon */
     float pairs[TRACE_LANES];    /* over pairs: (difference of V, times the pair's mean weight)^2 */
     float weight[TRACE_LANES], visible[TRACE_LANES]; /* sum w, sum w V */
     float rgb[3][TRACE_LANES];                       /* sum w e V */
@@ -51,6 +52,13 @@ struct trace_receiver {
     uint32_t pixel;
 };
 
+/* Receiver `pixel` of a job; false when it is none. `extent`: the scene's. */
+bool trace_receiver_read(
+    const struct pen_trace_job *job, float extent, uint32_t pixel, struct trace_receiver *out);
+/* False for a job or a light that cannot be traced. */
+bool trace_job_check(
+    const struct pen_trace_light *light, const struct pen_trace_job *job, struct pen_error *error);
+
 /* Loads `count` <= 16 receivers; `low_bits`: which bits of a sample a receiver may shift. */
 void trace_packet_load(struct trace_packet *packet, const struct trace_emitter *emitter,
     const struct trace_receiver *receivers, uint32_t count, uint32_t seed, uint32_t low_bits);
@@ -62,11 +70,26 @@ enum trace_mode {
     TRACE_ASSUME_VISIBLE = 4, /* shoot no rays */
     TRACE_UNSHIFTED = 8,      /* take the points as they are */
     TRACE_SHARES = 16,        /* there are blended surfaces */
+    TRACE_OWN_POINTS = 32,    /* a block has TRACE_LANES points for each of its count */
 };
 
 /* Adds the block's samples to *sums. */
 void trace_packet_run(const struct trace_emitter *emitter, struct trace_packet *packet,
     const struct trace_block *block, uint32_t mode, struct trace_sums *sums);
+
+/* Of one ray per lane: what stops it. */
+struct trace_nearest {
+    int32_t above[TRACE_LANES]
+        __attribute__((aligned(64))); /* -1: its point is above the horizon */
+    float share[TRACE_LANES];         /* of its light that arrives */
+    float distance
+        [TRACE_LANES]; /* to the nearest surface in its way, of that to the light; parallel: m;
+                                    INFINITY: there is none */
+    uint32_t rays;
+};
+/* Towards point (u[l], v[l]) for lane l, as fractions. */
+void trace_packet_nearest(const struct trace_emitter *emitter, struct trace_packet *packet,
+    const int32_t u[TRACE_LANES], const int32_t v[TRACE_LANES], struct trace_nearest *nearest);
 
 /* Emission at (u, v) in [-1,1]. */
 void trace_emission_at(const struct trace_emitter *emitter, float u, float v, float rgb[3]);

@@ -119,7 +119,7 @@ static void trace_block(void *context, uint32_t item)
     }
     struct trace_context query = {0};
     embree_context_init(&query.embree);
-    embree_intersect16(valid, p->rtc, &query.embree, &ray);
+    embree_intersect16(valid, p->rtc, &query.embree, &ray, true);
     for (uint32_t lane = 0; lane < LANES; lane++)
         if (valid[lane])
             store(p, (y0 + lane / BLOCK) * camera->width + x0 + lane % BLOCK, &ray, lane);

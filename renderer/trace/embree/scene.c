@@ -261,6 +261,7 @@ void pen_trace_scene_destroy(struct pen_trace_scene *scene)
     }
     for (uint32_t i = 0; scene->alpha.images && i < scene->alpha.image_count; i++)
         free(scene->alpha.images[i]);
+    free(scene->scratch);
     free(scene->alpha.images);
     free(scene->alpha.table);
     free(scene->alpha.uv);
@@ -274,4 +275,32 @@ struct pen_trace_scene_info pen_trace_scene_info(const struct pen_trace_scene *s
     struct pen_trace_scene_info info = scene->info;
     info.bytes = (uint64_t)atomic_load(&scene->bytes);
     return info;
+}
+
+void *trace_scratch_take(struct pen_trace_scene *scene, size_t *bytes)
+{
+    void *scratch = scene->scratch;
+    size_t has = scene->scratch_bytes;
+    scene->scratch = NULL;
+    scene->scratch_bytes = 0;
+    if (has >= *bytes && has / 2 <= *bytes) {
+        *bytes = has;
+        return scratch;
+    }
+    free(scratch);
+    atomic_fetch_add(&scene->bytes, (int64_t)*bytes - (int64_t)has);
+    scratch = aligned_alloc(64, *bytes);
+    if (!scratch)
+        atomic_fetch_sub(&scene->bytes, (int64_t)*bytes);
+    return scratch;
+}
+
+void trace_scratch_give(struct pen_trace_scene *scene, void *scratch, size_t bytes)
+{
+    if (!scratch)
+        return;
+    free(scene->scratch); /* of one that ended meanwhile */
+    atomic_fetch_sub(&scene->bytes, (int64_t)scene->scratch_bytes);
+    scene->scratch = scratch;
+    scene->scratch_bytes = bytes;
 }

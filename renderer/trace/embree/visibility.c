@@ -10,13 +10,13 @@
 #define TILE_RECEIVERS (TILE * TILE)
 
 struct run {
-    struct pen_trace_scene *scene;
+    struct trace_pieces pieces; /* first, as trace_in_pieces wants it */
     const struct pen_trace_job *job;
     const struct pen_trace_result *result;
     struct trace_emitter emitter;
     float mean_emission[3];
     uint32_t mode; /* enum trace_mode */
-    uint32_t samples, position_stride, normal_stride;
+    uint32_t samples;
     struct trace_points points;
     /* After the blocks before the one at hand; without counts a tile takes all its blocks at once. */
     struct pen_trace_kept kept;
@@ -28,7 +28,6 @@ struct run {
     uint32_t tiles_x, tile_width, tile_height;
     uint32_t tiles;
     _Atomic uint64_t rays, receivers, full_receivers;
-    atomic_bool late;
 };
 
 struct tile {
@@ -44,28 +43,9 @@ static struct tile tile_of(const struct run *run, uint32_t item)
     return t;
 }
 
-/* Reads receiver `pixel`; false when it is none. */
 static bool read_receiver(const struct run *run, uint32_t pixel, struct trace_receiver *out)
 {
-    const float *p = run->job->positions + (size_t)pixel * run->position_stride;
-    const float *n = run->job->normals + (size_t)pixel * run->normal_stride;
-    float length = sqrtf(trace_dot(n, n));
-    if (!(length > 0) || !isfinite(length + p[0] + p[1] + p[2]))
-        return false;
-    float largest = fmaxf(fmaxf(fabsf(p[0]), fabsf(p[1])), fabsf(p[2])), to[3];
-    for (int c = 0; c < 3; c++)
-        to[c] = run->job->eye[c] - p[c];
-    float distance = sqrtf(trace_dot(to, to)), rounding, pull;
-    float cosine = fmaxf(fabsf(trace_dot(n, to)) / (length * fmaxf(distance, 1e-30f)), 0.1f);
-    rounding = 0x1p-18f * fmaxf(largest, 0.25f * run->scene->extent);
-    out->bias = fmaxf(run->job->bias, rounding);
-    pull = fminf(fmaxf(run->job->depth_error, run->job->aim_error / cosine), 0.5f);
-    for (int c = 0; c < 3; c++) {
-        out->position[c] = p[c] + pull * to[c];
-        out->normal[c] = n[c] / length;
-    }
-    out->pixel = pixel;
-    return true;
+    return trace_receiver_read(run->job, run->pieces.scene->extent, pixel, out);
 }
 
 /* A tile's receivers in blocks of 4 x 4 (rows when the job is a list), so that sixteen in a row are
@@ -230,19 +210,11 @@ static void estimate_tile(void *context, uint32_t item)
     }
 }
 
-static bool is_late(struct run *run)
-{
-    uint64_t deadline = run->job->deadline_ns;
-    if (deadline && trace_seconds() * 1e9 > (double)deadline)
-        atomic_store(&run->late, true);
-    return atomic_load(&run->late);
-}
-
 static void sample_tile(void *context, uint32_t item)
 {
     struct run *run = context;
     struct trace_receiver receivers[TILE_RECEIVERS];
-    if (is_late(run))
+    if (trace_is_late(&run->pieces))
         return;
     uint32_t count = gather(run, tile_of(run, item), run->kept.full, receivers);
     if (run->block == 0)
@@ -291,7 +263,7 @@ static void early_tile(void *context, uint32_t item)
     struct trace_receiver receivers[TILE_RECEIVERS];
     struct trace_packet packet;
     uint64_t rays = 0;
-    if (is_late(run))
+    if (trace_is_late(&run->pieces))
         return;
     uint32_t count = gather(run, tile_of(run, item), NULL, receivers);
     for (uint32_t first = 0; first < count; first += TRACE_LANES) {
@@ -311,7 +283,7 @@ static void pretest_tile(void *context, uint32_t item)
     struct trace_receiver receivers[TILE_RECEIVERS];
     struct trace_packet packet;
     uint64_t rays = 0;
-    if (is_late(run))
+    if (trace_is_late(&run->pieces))
         return;
     uint32_t count = gather(run, tile_of(run, item), NULL, receivers);
     for (uint32_t first = 0; first < count; first += TRACE_LANES) {
@@ -368,7 +340,7 @@ static bool spread(struct run *run)
         run->kept.verdicts, job->width, job->height, radius, run->kept.full);
 }
 
-static bool check_job(
+bool trace_job_check(
     const struct pen_trace_light *light, const struct pen_trace_job *job, struct pen_error *error)
 {
     if (light->type > PEN_TRACE_POINT)
@@ -388,27 +360,14 @@ static bool check_job(
     return true;
 }
 
-static bool take_turn(void *context)
+/* All tiles; see trace_in_pieces. */
+static bool over_tiles(struct run *run, void (*work)(void *context, uint32_t item))
 {
-    struct run *run = context;
-    if (atomic_load(&run->late) || !run->job->turn(run->job->turn_context))
-        atomic_store(&run->late, true);
-    return !atomic_load(&run->late);
-}
-
-/* All tiles; now and then others come in between when they want to. */
-static bool over_tiles(
-    struct run *run, uint32_t threads, void (*tile)(void *context, uint32_t item), double *seconds)
-{
-    const struct pen_trace_job *job = run->job;
-    const struct trace_work work = {
-        tile, run, run->tiles, job->turn ? take_turn : NULL, job->turn_ms};
-    trace_parallel(threads, &work, seconds);
-    return !atomic_load(&run->late);
+    return trace_in_pieces(&run->pieces, run->tiles, work);
 }
 
 /* All receivers have had so many samples. False when it is late. */
-static bool look_up(struct run *run, uint32_t threads, uint32_t taken, double *cpu_seconds)
+static bool look_up(struct run *run, uint32_t taken)
 {
     const struct pen_trace_job *job = run->job;
     enum pen_trace_step step =
@@ -417,16 +376,14 @@ static bool look_up(struct run *run, uint32_t threads, uint32_t taken, double *c
         return true;
     run->taken = taken;
     run->enough = step == PEN_TRACE_STOP;
-    if (!over_tiles(run, threads, estimate_tile, cpu_seconds) ||
-        (!run->enough && !job->show(job->turn_context)))
-        atomic_store(&run->late, true);
-    return !atomic_load(&run->late);
+    if (!over_tiles(run, estimate_tile) || (!run->enough && !job->show(job->turn_context)))
+        atomic_store(&run->pieces.late, true);
+    return !atomic_load(&run->pieces.late);
 }
 
 /* The adaptive mode's first half: settles what the pre-test settles and leaves the
  * rest in `full`. */
-static bool select_receivers(
-    struct run *run, uint32_t threads, double *cpu_seconds, struct pen_error *error)
+static bool select_receivers(struct run *run, struct pen_error *error)
 {
     size_t count = (size_t)run->job->width * run->job->height;
     /* What is coloured or weighted is not to be told from counts. */
@@ -434,21 +391,21 @@ static bool select_receivers(
     run->kept.verdicts = calloc(count, 1);
     if (early && !(run->early = calloc(count, 1)))
         return pen_fail(error, PEN_INTERNAL, "", "Out of memory.");
-    if (early && (!over_tiles(run, threads, early_tile, cpu_seconds) ||
-                     !look_up(run, threads, TRACE_PRETEST_FIRST, cpu_seconds) || run->enough))
+    if (early &&
+        (!over_tiles(run, early_tile) || !look_up(run, TRACE_PRETEST_FIRST) || run->enough))
         return true;
     run->kept.full = calloc(count, 1);
     if (!run->kept.verdicts || !run->kept.full)
         return pen_fail(error, PEN_INTERNAL, "", "Out of memory.");
-    if (over_tiles(run, threads, pretest_tile, cpu_seconds) && !spread(run))
+    if (over_tiles(run, pretest_tile) && !spread(run))
         return pen_fail(error, PEN_INTERNAL, "", "Out of memory.");
-    if (over_tiles(run, threads, settle_tile, cpu_seconds) && early)
-        look_up(run, threads, TRACE_PRETEST_NET, cpu_seconds);
+    if (over_tiles(run, settle_tile) && early)
+        look_up(run, TRACE_PRETEST_NET);
     return true;
 }
 
 /* All samples of who needs them: block by block, or each tile at once. */
-static bool sample_all(struct run *run, uint32_t threads, double *cpu_seconds)
+static bool sample_all(struct run *run)
 {
     const struct pen_trace_job *job = run->job;
     size_t count = (size_t)job->width * job->height;
@@ -458,16 +415,16 @@ static bool sample_all(struct run *run, uint32_t threads, double *cpu_seconds)
     uint32_t blocks = run->kept.counts ? run->points.block_count : 1;
     run->taken = run->kept.samples;
     if (run->taken == run->samples)
-        return over_tiles(run, threads, estimate_tile, cpu_seconds);
-    if (run->taken && !look_up(run, threads, run->taken, cpu_seconds))
+        return over_tiles(run, estimate_tile);
+    if (run->taken && !look_up(run, run->taken))
         return false;
     for (run->block = run->kept.blocks; run->block < blocks && !run->enough; run->block++) {
         uint32_t end = run->taken + run->points.blocks[run->block].count;
-        if (!over_tiles(run, threads, sample_tile, cpu_seconds))
+        if (!over_tiles(run, sample_tile))
             return false;
         run->kept.samples = end;
         run->kept.blocks = run->block + 1;
-        if (run->block + 1 < blocks && !look_up(run, threads, end, cpu_seconds))
+        if (run->block + 1 < blocks && !look_up(run, end))
             return false;
         run->taken = end;
     }
@@ -502,15 +459,13 @@ bool pen_trace_visibility(struct pen_trace_scene *scene, const struct pen_trace_
     const struct pen_trace_job *job, const struct pen_trace_result *result,
     struct pen_trace_stats *stats, struct pen_error *error)
 {
-    double start = trace_seconds(), cpu_seconds = 0;
-    struct run run = {.scene = scene, .job = job, .result = result};
+    double start = trace_seconds();
+    struct run run = {.pieces = {.scene = scene, .job = job}, .job = job, .result = result};
     bool ok = false;
-    if (!check_job(light, job, error))
+    if (!trace_job_check(light, job, error))
         return false;
     bool point = light->type == PEN_TRACE_POINT;
     run.samples = point ? 1 : trace_points_round(job->samples);
-    run.position_stride = job->position_stride ? job->position_stride : 3;
-    run.normal_stride = job->normal_stride ? job->normal_stride : 3;
     run.emitter = trace_emitter_of(light);
     run.mode = (run.emitter.emission ? TRACE_COLOUR : 0) |
                (job->weighting == PEN_TRACE_G && !point ? TRACE_WEIGHTS : 0) |
@@ -533,16 +488,15 @@ bool pen_trace_visibility(struct pen_trace_scene *scene, const struct pen_trace_
     run.tile_width = job->height == 1 ? TILE_RECEIVERS : TILE;
     run.tiles_x = (job->width + run.tile_width - 1) / run.tile_width;
     run.tiles = run.tiles_x * ((job->height + run.tile_height - 1) / run.tile_height);
-    uint32_t threads = trace_thread_count(job->threads);
+    run.pieces.threads = trace_thread_count(job->threads);
     take_over(&run);
-    over_tiles(&run, threads, clear_tile, &cpu_seconds);
+    over_tiles(&run, clear_tile);
     if (run.kept.verdicts)
-        over_tiles(&run, threads, settle_tile, &cpu_seconds);
+        over_tiles(&run, settle_tile);
     else if (job->adaptive && !run.kept.samples &&
-             run.samples > TRACE_PRETEST_NET + TRACE_PRETEST_RIM &&
-             !select_receivers(&run, threads, &cpu_seconds, error))
+             run.samples > TRACE_PRETEST_NET + TRACE_PRETEST_RIM && !select_receivers(&run, error))
         goto fail;
-    if (!run.enough && !sample_all(&run, threads, &cpu_seconds)) {
+    if (!run.enough && !sample_all(&run)) {
         pen_fail(error, PEN_DEADLINE, "", "The deadline passed while rays were traced.");
         goto fail;
     }
@@ -556,10 +510,10 @@ bool pen_trace_visibility(struct pen_trace_scene *scene, const struct pen_trace_
             .casters = hierarchy->triangles,
             .filtered = hierarchy->filtered,
             .seconds = seconds,
-            .cpu_seconds = cpu_seconds,
+            .cpu_seconds = run.pieces.cpu_seconds,
             .mrays_per_second = (double)run.rays / seconds * 1e-6,
             .samples = run.samples,
-            .threads = threads};
+            .threads = run.pieces.threads};
     }
     ok = true;
 fail:

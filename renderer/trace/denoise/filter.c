@@ -1,0 +1,162 @@
+/* How wide the filter is, and the filter. */
+#include "renderer/trace/denoise/internal.h"
+#include <math.h>
+#include <string.h>
+
+#define WIDTH 0.15f /* half the filter's, of the penumbra's */
+#define NARROW 2    /* px: less is not filtered enough */
+#define RINGS 3     /* blocks around one, whose nearest blockers count when it knows none */
+#define LIKE (0.8f * 127 * 127)
+
+/* The pre-test's narrowest penumbra in the blocks around one, px. */
+static float reach_around(const struct denoise *d, uint32_t bx, uint32_t by)
+{
+    float least = INFINITY;
+    for (uint32_t ring = 1; ring <= RINGS && least == INFINITY; ring++) {
+        uint32_t x0 = bx > ring ? bx - ring : 0, y0 = by > ring ? by - ring : 0;
+        for (uint32_t y = y0; y <= by + ring && y < d->blocks_y; y++)
+            for (uint32_t x = x0; x <= bx + ring && x < d->blocks_x; x++)
+                least = fminf(least, d->reach[y * d->blocks_x + x]);
+    }
+    return least;
+}
+
+/* Its neighbours, or some part of their light, see another share of it. */
+static bool disagrees(const struct denoise *d, uint32_t x, uint32_t y)
+{
+    const float *values = d->value[0] + d->parts - 1;
+    uint32_t width = d->job->width, pixel = y * width + x;
+    uint32_t x0 = x ? x - 1 : 0, y0 = y ? y - 1 : 0;
+    for (uint32_t ny = y0; ny <= y + 1 && ny < d->job->height; ny++)
+        for (uint32_t nx = x0; nx <= x + 1 && nx < width; nx++) {
+            uint32_t other = ny * width + nx;
+            if (d->job->view->depths[other] > 0 &&
+                values[(size_t)d->parts * other] != values[(size_t)d->parts * pixel])
+                return true;
+        }
+    return false;
+}
+
+static uint32_t plan_block(struct denoise *d, uint32_t bx, uint32_t by)
+{
+    uint32_t width = d->job->width, height = d->job->height, narrow = 0;
+    float reach = reach_around(d, bx, by), half = reach < INFINITY ? WIDTH * reach : 0;
+    uint8_t radius = half < 1 ? 0 : half < 2 ? 1 : half < 4 ? 2 : half < 8 ? 4 : 8;
+    if (d->emitter.type == PEN_TRACE_POINT)
+        radius = 0;
+    d->radius[by * d->blocks_x + bx] = radius;
+    for (uint32_t y = by * BLOCK; y < (by + 1) * BLOCK && y < height; y++)
+        for (uint32_t x = bx * BLOCK; x < (bx + 1) * BLOCK && x < width; x++) {
+            bool wanted = radius < NARROW && d->how->refine &&
+                          d->job->view->depths[y * width + x] > 0 && disagrees(d, x, y);
+            d->wanted[y * width + x] = wanted;
+            narrow += wanted;
+        }
+    return narrow;
+}
+
+void denoise_plan(void *context, uint32_t tile)
+{
+    struct denoise *d = context;
+    uint32_t at[2], narrow = 0;
+    denoise_tile_at(d, tile, at);
+    for (uint32_t by = at[1] / BLOCK; by < (at[1] + TILE) / BLOCK && by < d->blocks_y; by++)
+        for (uint32_t bx = at[0] / BLOCK; bx < (at[0] + TILE) / BLOCK && bx < d->blocks_x; bx++)
+            if (d->work[denoise_half(d, bx * BLOCK, by * BLOCK)])
+                narrow += plan_block(d, bx, by);
+    atomic_fetch_add(&d->narrow, narrow);
+}
+
+/* A box of 2 radius, over what lies in the pixel's own surface. The point q of a pixel at (x, y) is
+ * eye + ray / depth with a ray that is linear in x and y, so its distance from the plane of p is
+ * n . ray(q) / depth(q) - n . ray(p) / depth(p). */
+static void filter_pixel(const struct denoise *d, const float *from, const uint32_t at[2],
+    int32_t radius, int axis, float out[4])
+{
+    const struct pen_trace_view *view = d->job->view;
+    uint32_t size = axis ? d->job->height : d->job->width, step = axis ? d->job->width : 1;
+    uint32_t parts = d->parts, pixel = at[1] * d->job->width + at[0];
+    const int8_t *n = d->normals[pixel];
+    const float normal[3] = {(float)n[0] / 127, (float)n[1] / 127, (float)n[2] / 127};
+    float ray[3], depth = view->depths[pixel], sum[4] = {0}, weight = 1;
+    memcpy(sum, from + (size_t)parts * pixel, parts * sizeof *sum);
+    for (int c = 0; c < 3; c++)
+        ray[c] = view->first[c] + (float)at[0] * view->right[c] + (float)at[1] * view->down[c];
+    float along = trace_dot(normal, ray);
+    float slope = trace_dot(normal, axis ? view->down : view->right), inverse = 1 / depth;
+    int32_t low = -radius, high = radius;
+    low = low < -(int32_t)at[axis] ? -(int32_t)at[axis] : low;
+    high = high > (int32_t)(size - 1 - at[axis]) ? (int32_t)(size - 1 - at[axis]) : high;
+    for (int32_t o = low; o <= high; o++) {
+        size_t other = (size_t)((int64_t)pixel + (int64_t)o * step);
+        const int8_t *m = d->normals[other];
+        float ratio = view->depths[other] * inverse, off = (float)o;
+        float distance = fabsf(along * (1 - ratio) + off * slope);
+        float like = (float)(n[0] * m[0] + n[1] * m[1] + n[2] * m[2]);
+        float w = o == 0 ? 0 : o == -radius || o == radius ? 0.5f : 1;
+        w = distance <= (fabsf(off) + 0.5f) * d->pixel * ratio && like >= LIKE ? w : 0;
+        weight += w;
+        for (uint32_t c = 0; c < parts; c++)
+            sum[c] += w * from[parts * other + c];
+    }
+    for (uint32_t c = 0; c < parts; c++)
+        out[c] = sum[c] / weight;
+}
+
+static uint8_t radius_at(const struct denoise *d, uint32_t x, uint32_t y)
+{
+    uint32_t block = y / BLOCK * d->blocks_x + x / BLOCK;
+    if (!d->work[denoise_half(d, x, y)] || !(d->job->view->depths[y * d->job->width + x] > 0))
+        return 0;
+    return d->capped && d->radius[block] < NARROW ? NARROW : d->radius[block];
+}
+
+void denoise_filter_x(void *context, uint32_t tile)
+{
+    struct denoise *d = context;
+    uint32_t at[2], width = d->job->width, height = d->job->height;
+    denoise_tile_at(d, tile, at);
+    for (uint32_t y = at[1]; y < at[1] + TILE && y < height; y++)
+        for (uint32_t x = at[0]; x < at[0] + TILE && x < width; x++) {
+            size_t first = (size_t)d->parts * (y * width + x);
+            const uint32_t pixel[2] = {x, y};
+            uint8_t radius = radius_at(d, x, y);
+            if (radius)
+                filter_pixel(d, d->value[0], pixel, radius, 0, d->value[1] + first);
+            else if (d->near[denoise_half(d, x, y)])
+                memcpy(d->value[1] + first, d->value[0] + first, d->parts * sizeof(float));
+        }
+}
+
+static void put(struct denoise *d, uint32_t pixel, const float *value, float scale)
+{
+    uint16_t *out = d->halves + 4 * (size_t)pixel;
+    float a = fminf(fmaxf(scale * value[d->parts - 1], 0), 1);
+    for (int c = 0; c < 3; c++)
+        out[c] = pen_trace_half(d->parts == 4 ? fmaxf(scale * value[c], 0) : a);
+    out[3] = pen_trace_half(a);
+}
+
+void denoise_filter_y(void *context, uint32_t tile)
+{
+    struct denoise *d = context;
+    uint32_t at[2], width = d->job->width, height = d->job->height;
+    denoise_tile_at(d, tile, at);
+    for (uint32_t y = at[1]; y < at[1] + TILE && y < height; y++)
+        for (uint32_t x = at[0]; x < at[0] + TILE && x < width; x++) {
+            uint32_t pixel = y * width + x;
+            const uint32_t place[2] = {x, y};
+            const float one[4] = {d->mean_emission[0], d->mean_emission[1], d->mean_emission[2], 1};
+            float out[4];
+            if (!d->work[denoise_half(d, x, y)]) {
+                bool umbra =
+                    d->verdicts[denoise_half(d, x, y)] == UMBRA && d->job->view->depths[pixel] > 0;
+                put(d, pixel, d->parts == 4 ? one : one + 3, umbra ? 0 : 1);
+                continue;
+            }
+            uint8_t radius = radius_at(d, x, y);
+            if (radius)
+                filter_pixel(d, d->value[1], place, radius, 1, out);
+            put(d, pixel, radius ? out : d->value[1] + (size_t)d->parts * pixel, d->fade[pixel]);
+        }
+}

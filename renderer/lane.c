@@ -63,9 +63,11 @@ static void run(void *context)
     lane->ok = frame_render(&lane->job, lane->frame, lane->result, &lane->error);
 }
 
-void lane_begin(struct lane *lane, struct pen_frame *frame, struct pen_result *result)
+void lane_begin(struct lane *lane, struct gl_account *account, struct pen_frame *frame,
+    struct pen_result *result)
 {
     lane->busy = true;
+    lane->charged = account;
     lane->ended = lane->ok = false;
     lane->frame = frame;
     lane->result = result;
@@ -80,7 +82,9 @@ bool lane_advance(struct lane *lane, double ms)
     struct technique_turns *turns = &lane->ctx.turns;
     turns->most_ms = ms;
     turns->since_ms = gl_now_ms();
+    struct gl_account *before = gl_textures_charge(lane->charged);
     lane->ended = gl_fiber_resume(lane->fiber);
+    lane->charged = gl_textures_charge(before);
     GLsync *left[] = {&turns->fence, &turns->under_way.fence};
     for (int i = 0; lane->ended && i < 2; i++)
         if (*left[i]) {

@@ -11,7 +11,8 @@ struct lane {
     struct frame_job job;
     /* Of the frame in progress: */
     bool busy, ended, ok;
-    uint64_t programs_since; /* gl_programs_clock when it began */
+    struct gl_account *charged; /* where it stopped */
+    uint64_t programs_since;    /* gl_programs_clock when it began */
     struct pen_frame *frame;
     struct pen_result *result;
     struct pen_error error;
@@ -22,8 +23,9 @@ bool lane_make(struct lane *lane, const struct technique_ctx *shared, uint32_t n
     struct pen_error *error);
 void lane_finish(struct lane *lane); /* not busy; zeroed or not made is fine */
 
-/* Begins lane->job; what is pointed at stays until the end. */
-void lane_begin(struct lane *lane, struct pen_frame *frame, struct pen_result *result);
+/* Begins lane->job, which is charged to *account; what is pointed at stays until the end. */
+void lane_begin(struct lane *lane, struct gl_account *account, struct pen_frame *frame,
+    struct pen_result *result);
 /* Goes on with it for about so many ms. True when it has ended. */
 bool lane_advance(struct lane *lane, double ms);
 /* Of one that has not ended: it gives up at once. */

@@ -1,50 +1,35 @@
 #include "renderer/renderer.h"
 #include "protocol/memory.h"
-#include "renderer/lane.h"
 #include "renderer/frame/output.h"
 #include "renderer/generate/generate.h"
 #include "renderer/gl/context.h"
 #include "renderer/passes/draw/kept_sums.h"
 #include "renderer/passes/filter/history.h"
-#include "renderer/passes/map/shadow_cache.h"
+#include "renderer/residency.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 
-#define MAX_RESIDENT 256
 #define DEFAULT_BUDGET (2ull << 30)
-#define SESSION_IDLE_MS 60e3
 #define EMISSION_BYTES (64u << 20) /* kept emission textures; they are cheap to make again */
 
 struct pen_render {
     struct pen_renderer *renderer;
     struct lane lane;
-    uint64_t target_bytes; /* of its lane */
-    uint64_t need;         /* what these are expected to come to */
+    struct residency_share share;
 };
 
 struct pen_renderer {
     struct gl_context *context;
     struct pen_device_info device;
     struct technique_ctx ctx; /* what lanes share */
+    struct residency residency;
     struct pen_render renders[PEN_MAX_RENDERS];
     const struct pen_render *advanced; /* the last one */
-    uint64_t budget, clock;
     bool lost;
-    struct scene *scenes[MAX_RESIDENT]; /* emission images too: scenes without geometry */
-    uint32_t scene_count;
-    struct emission_cache *emissions;
     struct technique_speed speeds[TECHNIQUE_SPEEDS];
-    const struct pen_blobs *admitting; /* not evicted now */
 };
-
-static bool make_room(struct pen_renderer *r, uint64_t more, const struct scene *keep);
-
-static void make_room_in_frame(void *owner, uint64_t bytes)
-{
-    make_room(owner, bytes, NULL);
-}
 
 struct pen_renderer *pen_renderer_create(
     const struct pen_renderer_config *config, struct pen_error *error)
@@ -55,28 +40,22 @@ struct pen_renderer *pen_renderer_create(
         free(r);
         return NULL;
     }
-    r->budget = config->gpu_memory_bytes ? config->gpu_memory_bytes : DEFAULT_BUDGET;
-    r->ctx.gpu_memory = r->budget;
-    r->ctx.shadow_memory = r->budget / 4;
     r->ctx.software = r->device.software;
     r->ctx.is_called = config->is_called;
     r->ctx.call_context = config->call_context;
-    r->ctx.make_room = make_room_in_frame;
-    r->ctx.room_owner = r;
-    r->ctx.programs = gl_programs_create(config->programs);
     r->ctx.speeds = r->speeds;
-    r->ctx.shadows = shadow_cache_create();
-    r->ctx.histories = history_store_create(
-        r->budget / 4, config->session_idle_ms > 0 ? config->session_idle_ms : SESSION_IDLE_MS);
-    r->ctx.kept_sums = kept_sums_store_create(r->budget / 8);
-    r->emissions = emission_cache_create();
+    residency_start(&r->residency, &r->ctx,
+        config->gpu_memory_bytes ? config->gpu_memory_bytes : DEFAULT_BUDGET, config->programs,
+        config->session_idle_ms);
     gl_samplers_init(&r->ctx.samplers);
     gl.CreateVertexArrays(1, &r->ctx.empty_array);
     r->ctx.white = gl_texture_create(GL_RGBA8, 1, 1, 0, 1);
     static const uint8_t white[4] = {255, 255, 255, 255};
     gl.TextureSubImage2D(r->ctx.white.name, 0, 0, 0, 1, 1, GL_RGBA, GL_UNSIGNED_BYTE, white);
-    for (uint32_t i = 0; i < PEN_MAX_RENDERS; i++)
+    for (uint32_t i = 0; i < PEN_MAX_RENDERS; i++) {
         r->renders[i].renderer = r;
+        residency_share_start(&r->residency, &r->renders[i].share, &r->renders[i].lane);
+    }
     if (!lane_make(&r->renders[0].lane, &r->ctx, 0, error)) {
         pen_renderer_destroy(r);
         return NULL;
@@ -90,14 +69,8 @@ void pen_renderer_destroy(struct pen_renderer *r)
         return;
     for (uint32_t i = 0; i < PEN_MAX_RENDERS; i++)
         lane_finish(&r->renders[i].lane);
-    for (uint32_t i = 0; i < r->scene_count; i++)
-        scene_destroy(r->scenes[i]);
-    shadow_cache_destroy(r->ctx.shadows);
-    history_store_destroy(r->ctx.histories);
-    kept_sums_store_destroy(r->ctx.kept_sums);
-    emission_cache_destroy(r->emissions);
+    residency_stop(&r->residency);
     gl_samplers_finish(&r->ctx.samplers);
-    gl_programs_destroy(r->ctx.programs);
     gl_texture_destroy(&r->ctx.white);
     gl.DeleteVertexArrays(1, &r->ctx.empty_array);
     gl_context_destroy(r->context);
@@ -109,188 +82,30 @@ const struct pen_device_info *pen_renderer_device(const struct pen_renderer *r)
     return &r->device;
 }
 
-static struct scene *find_scene(const struct pen_renderer *r, const uint8_t id[PEN_ID_BYTES])
-{
-    for (uint32_t i = 0; i < r->scene_count; i++)
-        if (!memcmp(r->scenes[i]->id, id, PEN_ID_BYTES))
-            return r->scenes[i];
-    return NULL;
-}
-
-static uint64_t scene_bytes(const struct pen_renderer *r)
-{
-    uint64_t bytes = 0;
-    for (uint32_t i = 0; i < r->scene_count; i++)
-        bytes += r->scenes[i]->bytes;
-    return bytes;
-}
-
-static uint64_t cached_bytes(const struct pen_renderer *r)
-{
-    return scene_bytes(r) + shadow_cache_bytes(r->ctx.shadows) +
-           emission_cache_bytes(r->emissions) + history_store_bytes(r->ctx.histories) +
-           kept_sums_store_bytes(r->ctx.kept_sums);
-}
-
-uint64_t pen_renderer_gpu_bytes(const struct pen_renderer *r)
-{
-    uint64_t bytes = cached_bytes(r);
-    for (uint32_t i = 0; i < PEN_MAX_RENDERS; i++)
-        bytes += r->renders[i].target_bytes;
-    return bytes;
-}
-
-/* What is held, and what renders in progress will still take. */
-static uint64_t claimed_bytes(const struct pen_renderer *r)
-{
-    uint64_t bytes = cached_bytes(r);
-    for (uint32_t i = 0; i < PEN_MAX_RENDERS; i++) {
-        const struct pen_render *render = &r->renders[i];
-        bool more = render->lane.busy && render->need > render->target_bytes;
-        bytes += more ? render->need : render->target_bytes;
-    }
-    return bytes;
-}
-
 struct pen_program_counts pen_renderer_programs(const struct pen_renderer *r)
 {
     return gl_programs_counts(r->ctx.programs);
 }
 
-/* A frame in progress reads it. */
-static bool is_read(const struct pen_renderer *r, const struct scene *scene)
+uint64_t pen_renderer_gpu_bytes(const struct pen_renderer *r)
 {
-    for (uint32_t i = 0; i < PEN_MAX_RENDERS; i++) {
-        const struct lane *lane = &r->renders[i].lane;
-        if (!lane->busy)
-            continue;
-        const struct pen_request *request = &lane->result->completed;
-        if (lane->job.scene == scene)
-            return true;
-        for (uint32_t k = 0; k < request->light_count; k++)
-            if (request->lights[k].texture == PEN_TEXTURE_IMAGE &&
-                !memcmp(request->lights[k].image, scene->id, PEN_ID_BYTES))
-                return true;
-    }
-    return false;
-}
-
-/* The same, or one that is about to begin will. */
-static bool is_used(const struct pen_renderer *r, const struct scene *scene)
-{
-    for (uint32_t i = 0; r->admitting && i < r->admitting->count; i++)
-        if (!memcmp(r->admitting->ids[i], scene->id, PEN_ID_BYTES))
-            return true;
-    return is_read(r, scene);
-}
-
-static void remove_scene(struct pen_renderer *r, uint32_t i)
-{
-    shadow_cache_drop_scene(r->ctx.shadows, r->scenes[i]);
-    emission_cache_drop(r->emissions, r->scenes[i]->id);
-    kept_sums_store_drop(r->ctx.kept_sums, r->scenes[i]->id);
-    scene_destroy(r->scenes[i]);
-    r->scenes[i] = r->scenes[--r->scene_count];
-}
-
-static bool is_any_busy(const struct pen_renderer *r)
-{
-    for (uint32_t i = 0; i < PEN_MAX_RENDERS; i++)
-        if (r->renders[i].lane.busy)
-            return true;
-    return false;
-}
-
-/* Frees something that can be made again, the cheapest first: sums that somebody may ask more of,
- * targets that nobody draws into, shadow inputs, sessions, emission textures, scenes, hierarchies for rays. False: all that is left is in use. */
-static bool evict(struct pen_renderer *r, uint64_t bytes, const struct scene *keep)
-{
-    uint64_t least = UINT64_MAX, before = kept_sums_store_bytes(r->ctx.kept_sums);
-    kept_sums_store_trim(r->ctx.kept_sums, before > bytes ? before - bytes : 0);
-    if (kept_sums_store_bytes(r->ctx.kept_sums) < before)
-        return true;
-    for (uint32_t i = 0; i < PEN_MAX_RENDERS; i++)
-        if (!r->renders[i].lane.busy && r->renders[i].target_bytes) {
-            lane_finish(&r->renders[i].lane);
-            return true;
-        }
-    before = shadow_cache_bytes(r->ctx.shadows);
-    shadow_cache_trim(r->ctx.shadows, before > bytes ? before - bytes : 0);
-    if (shadow_cache_bytes(r->ctx.shadows) < before)
-        return true;
-    before = history_store_bytes(r->ctx.histories);
-    history_store_trim(r->ctx.histories, before > bytes ? before - bytes : 0);
-    if (history_store_bytes(r->ctx.histories) < before)
-        return true;
-    before = emission_cache_bytes(r->emissions);
-    if (before && !is_any_busy(r)) {
-        emission_cache_trim(r->emissions, 0);
-        return true;
-    }
-    uint32_t oldest = UINT32_MAX;
-    for (uint32_t i = 0; i < r->scene_count; i++)
-        if (r->scenes[i] != keep && r->scenes[i]->last_use < least && !is_used(r, r->scenes[i]))
-            least = r->scenes[i]->last_use, oldest = i;
-    if (oldest != UINT32_MAX) {
-        remove_scene(r, oldest);
-        return true;
-    }
-    for (uint32_t i = 0; i < r->scene_count; i++)
-        if (!is_read(r, r->scenes[i]) && scene_shed(r->scenes[i]))
-            return true;
-    return false;
-}
-
-/* Evicts until the budget holds with so many bytes more. `keep` stays whatever happens. */
-static bool make_room(struct pen_renderer *r, uint64_t more, const struct scene *keep)
-{
-    for (;;) {
-        uint64_t bytes = claimed_bytes(r) + more;
-        if (bytes <= r->budget && r->scene_count < MAX_RESIDENT)
-            return true;
-        if (!evict(r, bytes > r->budget ? bytes - r->budget : 0, keep))
-            return false;
-    }
-}
-
-static bool load(struct pen_renderer *r, struct scene *scene, struct pen_error *error)
-{
-    if (!scene)
-        return false;
-    if (scene->bytes > r->budget) {
-        pen_fail(error, PEN_TOO_BIG, "",
-            "The scene needs %.0f MiB of GPU memory; %.0f MiB are allowed.",
-            (double)scene->bytes / (1 << 20), (double)r->budget / (1 << 20));
-        scene_destroy(scene);
-        return false;
-    }
-    scene->last_use = ++r->clock;
-    r->scenes[r->scene_count++] = scene;
-    make_room(r, 0, scene);
-    return true;
+    return residency_bytes(&r->residency);
 }
 
 bool pen_renderer_load_scene(
     struct pen_renderer *r, const uint8_t id[PEN_ID_BYTES], int fd, struct pen_error *error)
 {
-    return find_scene(r, id) || load(r, scene_create(id, fd, error), error);
+    return residency_load(&r->residency, id, fd, error);
 }
 
 bool pen_renderer_has_scene(const struct pen_renderer *r, const uint8_t id[PEN_ID_BYTES])
 {
-    return find_scene(r, id) != NULL;
+    return residency_find(&r->residency, id) != NULL;
 }
 
 void pen_renderer_drop_scene(struct pen_renderer *r, const uint8_t id[PEN_ID_BYTES])
 {
-    for (uint32_t i = 0; i < r->scene_count; i++)
-        if (!memcmp(r->scenes[i]->id, id, PEN_ID_BYTES)) {
-            if (is_used(r, r->scenes[i]))
-                r->scenes[i]->last_use = 0; /* the first to be evicted */
-            else
-                remove_scene(r, i);
-            return;
-        }
+    residency_drop(&r->residency, id);
 }
 
 bool pen_renderer_load_image(
@@ -307,9 +122,9 @@ bool pen_renderer_has_image(const struct pen_renderer *r, const uint8_t id[PEN_I
 static const struct scene *find_image(void *owner, const struct pen_light *light)
 {
     struct pen_renderer *r = owner;
-    struct scene *scene = find_scene(r, light->image);
+    struct scene *scene = residency_find(&r->residency, light->image);
     if (scene)
-        scene->last_use = ++r->clock;
+        scene->last_use = ++r->residency.clock;
     return scene;
 }
 
@@ -352,7 +167,7 @@ static uint64_t blob_bytes(
 {
     uint64_t bytes = 0;
     for (uint32_t i = 0; i < blobs->count; i++) {
-        const struct scene *scene = find_scene(r, blobs->ids[i]);
+        const struct scene *scene = residency_find(&r->residency, blobs->ids[i]);
         struct stat status;
         if ((scene != NULL) != resident)
             continue;
@@ -367,7 +182,7 @@ static uint64_t blob_bytes(
 static uint64_t picture_bytes(const struct pen_renderer *r, const struct pen_request *request)
 {
     uint32_t lights = request->light_count;
-    const struct scene *scene = find_scene(r, request->scene);
+    const struct scene *scene = residency_find(&r->residency, request->scene);
     if (!request->lights_given && scene)
         lights =
             scene->blob.light_count < PEN_MAX_LIGHTS ? scene->blob.light_count : PEN_MAX_LIGHTS;
@@ -378,9 +193,9 @@ static bool load_blobs(
     struct pen_renderer *r, const struct pen_blobs *blobs, struct pen_error *error)
 {
     for (uint32_t i = 0; i < blobs->count; i++) {
-        struct scene *scene = find_scene(r, blobs->ids[i]);
+        struct scene *scene = residency_find(&r->residency, blobs->ids[i]);
         if (scene)
-            scene->last_use = ++r->clock;
+            scene->last_use = ++r->residency.clock;
         else if (!pen_renderer_load_scene(r, blobs->ids[i], blobs->fds[i], error))
             return false;
     }
@@ -390,23 +205,24 @@ static bool load_blobs(
 enum pen_admission pen_renderer_admit(struct pen_renderer *r, const struct pen_request *request,
     const struct pen_blobs *blobs, struct pen_error *error)
 {
-    struct scene *scene = find_scene(r, request->scene);
-    bool alone = !is_any_busy(r);
+    struct scene *scene = residency_find(&r->residency, request->scene);
+    bool alone = !residency_is_any_busy(&r->residency);
     enum pen_admission admission = PEN_LATER;
     if (!free_render(r) || (scene && !can_pose(r, scene, request)) || is_session_busy(r, request))
         return PEN_LATER;
-    r->admitting = blobs;
+    r->residency.wanted = blobs->ids;
+    r->residency.wanted_count = blobs->count;
     /* Room first, so that old and new are never there together; and nothing is loaded in vain while
      * others are there. */
     uint64_t more = blob_bytes(r, blobs, false) + picture_bytes(r, request);
-    if (!make_room(r, more, NULL) && !alone)
+    if (!residency_make_room(&r->residency, more, NULL) && !alone)
         goto done;
     if (!load_blobs(r, blobs, error)) {
         admission = PEN_REFUSED;
         goto done;
     }
     uint64_t picture = picture_bytes(r, request);
-    if (make_room(r, picture, NULL)) {
+    if (residency_make_room(&r->residency, picture, NULL)) {
         admission = PEN_ADMITTED;
     } else if (alone) {
         pen_fail(error, PEN_TOO_BIG, "",
@@ -415,13 +231,13 @@ enum pen_admission pen_renderer_admit(struct pen_renderer *r, const struct pen_r
             "or "
             "have --gpu-memory raised.",
             (double)blob_bytes(r, blobs, true) / (1 << 20), (double)picture / (1 << 20),
-            (double)r->budget / (1 << 20));
+            (double)r->residency.budget / (1 << 20));
         admission = PEN_REFUSED;
     }
 done:
-    r->admitting = NULL;
+    r->residency.wanted_count = 0;
     if (admission != PEN_ADMITTED)
-        make_room(r, 0, NULL);
+        residency_make_room(&r->residency, 0, NULL);
     return admission;
 }
 
@@ -432,7 +248,7 @@ struct pen_render *pen_render_begin(struct pen_renderer *r, const struct pen_req
     memset(frame, 0, sizeof *frame);
     result->completed = *request;
     result->device = r->device;
-    struct scene *scene = find_scene(r, request->scene);
+    struct scene *scene = residency_find(&r->residency, request->scene);
     struct pen_render *render = free_render(r);
     if (!pen_request_check(request, pen_renderer_catalogue(), error))
         goto fail;
@@ -444,10 +260,8 @@ struct pen_render *pen_render_begin(struct pen_renderer *r, const struct pen_req
     uint32_t t = 0;
     while (strcmp(technique_registry[t]->info.name, request->technique))
         t++;
-    scene->last_use = ++r->clock;
-    for (uint32_t i = 0; i < r->scene_count; i++)
-        if (r->scenes[i] != scene && !is_used(r, r->scenes[i]))
-            scene_rest(r->scenes[i]);
+    scene->last_use = ++r->residency.clock;
+    residency_rest_others(&r->residency, scene);
     scene->rests = false;
     if (!scene_set_pose(scene, request, error))
         goto fail;
@@ -460,13 +274,13 @@ struct pen_render *pen_render_begin(struct pen_renderer *r, const struct pen_req
         .request = &result->completed,
         .technique = technique_registry[t],
         .technique_state = lane->states[t],
-        .emissions = r->emissions,
+        .emissions = r->residency.emissions,
         .find_image = find_image,
         .owner = r};
-    render->need = picture_bytes(r, request);
+    render->share.need = picture_bytes(r, request);
     if (technique_registry[t]->info.keeps_history)
         lane->job.history = history_open(r->ctx.histories, lane->ctx.lane, request);
-    lane_begin(lane, frame, result);
+    lane_begin(lane, &render->share.targets, frame, result);
     return render;
 fail:
     if (error)
@@ -489,10 +303,10 @@ void pen_render_continue(struct pen_render *render)
 {
     struct pen_renderer *r = render->renderer;
     struct frame_job *job = &render->lane.job;
-    uint64_t claimed = claimed_bytes(r);
+    uint64_t claimed = residency_claimed(&r->residency);
     if (job->technique->keeps_sums)
         job->sums = kept_sums_open(r->ctx.kept_sums, job->request, &job->technique->info,
-            claimed < r->budget ? r->budget - claimed : 0);
+            claimed < r->residency.budget ? r->residency.budget - claimed : 0);
 }
 
 bool pen_render_advance(struct pen_render *render, double ms)
@@ -501,10 +315,7 @@ bool pen_render_advance(struct pen_render *render, double ms)
     if (r->ctx.software && r->advanced != render)
         gl_wait(); /* what another has under way would be taken for this one's */
     r->advanced = render;
-    gl_targets_charge(&render->target_bytes);
-    bool ended = lane_advance(&render->lane, ms);
-    gl_targets_charge(NULL);
-    return ended;
+    return lane_advance(&render->lane, ms);
 }
 
 struct pen_place pen_render_place(const struct pen_render *render)
@@ -534,7 +345,7 @@ bool pen_render_end(struct pen_render *render, struct pen_error *error)
     lane->job.history = NULL;
     kept_sums_close(r->ctx.kept_sums, lane->job.sums);
     lane->job.sums = NULL;
-    shadow_cache_end_frame(&lane->ctx);
+    shadow_cache_release(&lane->ctx);
     uint64_t since = lane->programs_since;
     for (uint32_t i = 0; i < PEN_MAX_RENDERS; i++) {
         const struct lane *other = &r->renders[i].lane;
@@ -542,9 +353,9 @@ bool pen_render_end(struct pen_render *render, struct pen_error *error)
             since = other->programs_since;
     }
     gl_programs_end_frame(r->ctx.programs, since);
-    if (!is_any_busy(r))
-        emission_cache_trim(r->emissions, EMISSION_BYTES);
-    make_room(r, 0, lane->job.scene); /* what the lane keeps may go, too */
+    if (!residency_is_any_busy(&r->residency))
+        emission_cache_trim(r->residency.emissions, EMISSION_BYTES);
+    residency_make_room(&r->residency, 0, lane->job.scene); /* what the lane keeps may go, too */
     result->gpu_bytes = pen_renderer_gpu_bytes(r);
     result->programs = gl_programs_counts(r->ctx.programs);
     GLenum gl_error = gl.GetError();

@@ -65,9 +65,6 @@ struct technique_ctx {
     uint32_t lane;                    /* number of this one */
     bool (*is_called)(void *context); /* as pen_renderer_config has it */
     void *call_context;
-    /* Before so many bytes are taken: what can be made again goes where they would exceed the budget. */
-    void (*make_room)(void *owner, uint64_t bytes);
-    void *room_owner;
     struct gl_programs *programs;
     struct gl_samplers samplers;
     struct gl_timer timer;

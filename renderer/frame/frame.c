@@ -140,6 +140,7 @@ static bool record_face(
     const struct frame_job *job = f->job;
     struct light_face *face = &f->lights[light].faces[number];
     struct technique_ctx *ctx = job->ctx;
+    shadow_cache_release(ctx); /* of many lights, not all fit at once */
     aim_face(f, face);
     const struct emission *emission = f->emissions[light];
     struct technique_run run = {.ctx = ctx,

@@ -36,6 +36,9 @@ struct entry {
 
 struct gl_programs {
     uint32_t most;
+    uint64_t most_bytes;
+    void (*make_room)(void *owner, uint64_t bytes);
+    void *owner;
     struct pen_program_counts counts;
     struct entry *entries; /* counts.kept of them */
     size_t room;
@@ -338,6 +341,8 @@ static void keep(struct gl_programs *programs, const struct key *key, GLuint pro
         .program = program};
     counts->bytes += e->bytes;
     counts->compiled++;
+    if (programs->make_room)
+        programs->make_room(programs->owner, 0);
 }
 
 GLuint gl_programs_get(
@@ -375,7 +380,7 @@ uint64_t gl_programs_clock(const struct gl_programs *programs)
 void gl_programs_end_frame(struct gl_programs *programs, uint64_t since)
 {
     struct pen_program_counts *counts = &programs->counts;
-    while (counts->kept > programs->most || counts->bytes > MOST_BYTES) {
+    while (counts->kept > programs->most || counts->bytes > programs->most_bytes) {
         uint32_t oldest = 0;
         for (uint32_t i = 1; i < counts->kept; i++)
             if (programs->entries[i].last_use < programs->entries[oldest].last_use)
@@ -393,10 +398,14 @@ struct pen_program_counts gl_programs_counts(const struct gl_programs *programs)
     return programs->counts;
 }
 
-struct gl_programs *gl_programs_create(uint32_t most)
+struct gl_programs *gl_programs_create(
+    uint32_t most, uint64_t most_bytes, void (*make_room)(void *owner, uint64_t bytes), void *owner)
 {
     struct gl_programs *programs = pen_alloc_zero(1, sizeof *programs);
     programs->most = most ? most : MOST_PROGRAMS;
+    programs->most_bytes = most_bytes ? most_bytes : MOST_BYTES;
+    programs->make_room = make_room;
+    programs->owner = owner;
     return programs;
 }
 

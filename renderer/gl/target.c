@@ -1,8 +1,7 @@
 #include "renderer/gl/target.h"
 #include <string.h>
 
-static uint64_t all_bytes, nobodys;
-static uint64_t *charged = &nobodys;
+static uint64_t all_bytes;
 
 static GLenum attachment_of(const struct gl_texture *texture)
 {
@@ -14,8 +13,6 @@ static void attach(struct gl_target *target)
     const struct gl_texture *t = &target->texture;
     bool depth = attachment_of(t) == GL_DEPTH_ATTACHMENT;
     all_bytes += t->bytes;
-    target->account = charged;
-    *charged += t->bytes;
     target->framebuffer = gl_framebuffer_create(&t, depth ? 0 : 1, depth ? t : NULL);
 }
 
@@ -52,7 +49,6 @@ void gl_target_destroy(struct gl_target *target)
         return;
     gl.DeleteFramebuffers(1, &target->framebuffer);
     all_bytes -= target->texture.bytes;
-    *target->account -= target->texture.bytes;
     gl_texture_destroy(&target->texture);
     memset(target, 0, sizeof *target);
 }
@@ -75,11 +71,4 @@ void gl_target_clear(const struct gl_target *target, const float value[4])
 uint64_t gl_targets_bytes(void)
 {
     return all_bytes;
-}
-
-uint64_t *gl_targets_charge(uint64_t *account)
-{
-    uint64_t *before = charged;
-    charged = account ? account : &nobodys;
-    return before;
 }

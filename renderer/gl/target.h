@@ -6,7 +6,6 @@
 struct gl_target {
     struct gl_texture texture;
     GLuint framebuffer; /* level 0 (of an array layer 0) as its one attachment */
-    uint64_t *account;  /* its bytes are in it */
 };
 
 /* Makes *target be of this shape (as gl_texture_create), reusing it when it already is; zero to
@@ -25,6 +24,3 @@ void gl_target_clear(const struct gl_target *target, const float value[4]);
 
 /* What all targets of the process hold. On the GL thread, as all of OpenGL. */
 uint64_t gl_targets_bytes(void);
-/* From now on the bytes of new targets are in *account too, which outlives them; NULL: in none.
- * Returns what was there before. */
-uint64_t *gl_targets_charge(uint64_t *account);

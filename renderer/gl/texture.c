@@ -2,6 +2,33 @@
 #include <assert.h>
 #include <string.h>
 
+static struct gl_account *charged;
+
+struct gl_account *gl_textures_charge(struct gl_account *account)
+{
+    struct gl_account *before = charged;
+    charged = account;
+    return before;
+}
+
+void gl_texture_release_account(struct gl_texture *texture)
+{
+    if (texture->account)
+        texture->account->bytes -= texture->bytes;
+    texture->account = NULL;
+}
+
+/* Before the driver takes the memory, since then it is too late to make room. */
+static void charge(struct gl_texture *texture)
+{
+    texture->account = charged;
+    if (!charged)
+        return;
+    if (charged->make_room)
+        charged->make_room(charged->owner, texture->bytes);
+    charged->bytes += texture->bytes;
+}
+
 static uint32_t texel_bytes(GLenum format)
 {
     switch (format) {
@@ -38,6 +65,11 @@ struct gl_texture gl_texture_create(
         .height = height,
         .layers = layers,
         .levels = levels && levels < chain ? levels : chain};
+    for (uint32_t l = 0; l < t.levels; l++) {
+        uint64_t lw = width >> l ? width >> l : 1, lh = height >> l ? height >> l : 1;
+        t.bytes += lw * lh * (layers ? layers : 1) * texel_bytes(format);
+    }
+    charge(&t);
     gl.CreateTextures(t.target, 1, &t.name);
     GLsizei n = (GLsizei)t.levels, w = (GLsizei)width, h = (GLsizei)height;
     if (layers)
@@ -49,10 +81,6 @@ struct gl_texture gl_texture_create(
     gl.TextureParameteri(t.name, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
     gl.TextureParameteri(t.name, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
     gl.TextureParameteri(t.name, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
-    for (uint32_t l = 0; l < t.levels; l++) {
-        uint64_t lw = width >> l ? width >> l : 1, lh = height >> l ? height >> l : 1;
-        t.bytes += lw * lh * (layers ? layers : 1) * texel_bytes(format);
-    }
     return t;
 }
 
@@ -65,6 +93,7 @@ struct gl_texture gl_texture_create_samples(
         .height = height,
         .levels = 1,
         .bytes = (uint64_t)width * height * samples * texel_bytes(format)};
+    charge(&t);
     gl.CreateTextures(t.target, 1, &t.name);
     gl.TextureStorage2DMultisample(
         t.name, (GLsizei)samples, format, (GLsizei)width, (GLsizei)height, GL_TRUE);
@@ -75,6 +104,7 @@ void gl_texture_destroy(struct gl_texture *texture)
 {
     if (!texture)
         return;
+    gl_texture_release_account(texture);
     if (texture->name)
         gl.DeleteTextures(1, &texture->name);
     memset(texture, 0, sizeof *texture);

@@ -8,7 +8,21 @@ struct gl_texture {
     GLenum target, format;
     uint32_t width, height, layers, levels;
     uint64_t bytes;
+    struct gl_account *account; /* its bytes are in it; NULL: in none */
 };
+
+/* Who is charged for what is made. */
+struct gl_account {
+    uint64_t bytes;
+    /* Called before so many more are taken; NULL: nobody is. */
+    void (*make_room)(void *owner, uint64_t bytes);
+    void *owner;
+};
+/* From now on new textures and targets are charged to *account, which outlives them; NULL: to none.
+ * Returns what was there before. */
+struct gl_account *gl_textures_charge(struct gl_account *account);
+/* From now on its bytes are counted elsewhere. */
+void gl_texture_release_account(struct gl_texture *texture);
 
 /* GL_TEXTURE_2D (layers 0) or GL_TEXTURE_2D_ARRAY, immutable. levels 0: the whole chain. Sampling
  * state of the texture itself: nearest, clamped; use gl_sampler for anything else. */

@@ -81,6 +81,7 @@ void emission_cache_drop(struct emission_cache *cache, const uint8_t id[PEN_ID_B
 static void upload(struct emission *emission, uint32_t side, float (*texels)[4])
 {
     emission->texture = gl_texture_create(GL_RGBA16F, side, side, 0, 0);
+    gl_texture_release_account(&emission->texture); /* the cache counts it */
     for (size_t i = 0; i < (size_t)side * side; i++) {
         const float *t = texels[i];
         texels[i][3] = (t[0] * t[0] + t[1] * t[1] + t[2] * t[2]) / 3;

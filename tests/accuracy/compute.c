@@ -13,7 +13,7 @@ bool compute_begin(struct technique_ctx *ctx, struct gl_context **context)
         fprintf(stderr, "skipped: %s\n", error.message);
         return false;
     }
-    ctx->programs = gl_programs_create(0);
+    ctx->programs = gl_programs_create(0, 0, NULL, NULL);
     gl_samplers_init(&ctx->samplers);
     ctx->software = device.software;
     gl_timer_init(&ctx->timer, ctx->software);

@@ -194,6 +194,56 @@ static void check_maps_within_a_frame(void)
     pen_renderer_destroy(r);
 }
 
+/* Of `count` lights, each with maps of its own; what the renderer holds between any two pieces goes to
+ * *most. */
+static uint64_t render_lights(
+    struct pen_renderer *r, const char *technique, uint32_t count, uint64_t *most)
+{
+    struct pen_error error;
+    struct progress p = {0};
+    struct pen_result first;
+    fixture_request(&p.request, blobs.ids[IN_USE], technique);
+    p.request.width = 80, p.request.height = 60;
+    CHECK(admit(r, &p.request, IN_USE, false, &error) == PEN_ADMITTED);
+    fixture_render(r, &p.request, &first);
+    p.request.lights_given = 1;
+    p.request.light_count = count;
+    for (uint32_t i = 0; i < count; i++) {
+        p.request.lights[i] = first.completed.lights[0];
+        p.request.lights[i].position[0] += 0.1f * (float)i;
+    }
+    CHECK(admit(r, &p.request, IN_USE, false, &error) == PEN_ADMITTED);
+    p.render = pen_render_begin(r, &p.request, &p.frame, &p.result, &error);
+    CHECK(p.render);
+    *most = 0;
+    while (p.render && !pen_render_advance(p.render, 0))
+        if (pen_renderer_gpu_bytes(r) > *most)
+            *most = pen_renderer_gpu_bytes(r);
+    CHECK(pen_render_end(p.render, NULL));
+    uint64_t hash = fixture_hash(&p.frame);
+    pen_frame_finish(&p.frame);
+    return hash;
+}
+
+/* A light's maps go where the next one's want to be: a frame of many lights takes no more memory than
+ * one of a few, and is the same. What is used up by making a map (`vssm`: sums of rows) counts. */
+static void check_lights_within_a_frame(void)
+{
+    static const char *const techniques[] = {"pcf", "vssm"};
+    struct pen_error error;
+    for (int i = 0; i < 2; i++) {
+        uint64_t most[3];
+        struct pen_renderer *r = fixture_renderer(PEN_DEVICE_AUTO, 0, &error);
+        render_lights(r, techniques[i], 3, &most[0]);
+        uint64_t whole = render_lights(r, techniques[i], 8, &most[1]);
+        pen_renderer_destroy(r);
+        CHECK(most[1] > 3 * most[0] / 2); /* else it shows nothing */
+        r = fixture_renderer(PEN_DEVICE_AUTO, most[0], &error);
+        CHECK(render_lights(r, techniques[i], 8, &most[2]) == whole && most[2] <= most[0]);
+        pen_renderer_destroy(r);
+    }
+}
+
 int main(void)
 {
     struct pen_error error;
@@ -207,6 +257,7 @@ int main(void)
     check_scenes_in_use(blob);
     check_pictures(blob);
     check_maps_within_a_frame();
+    check_lights_within_a_frame();
     for (uint32_t i = 0; i < BLOBS; i++)
         close(blobs.fds[i]);
     CHECK_DONE();

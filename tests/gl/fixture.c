@@ -62,6 +62,11 @@ void fixture_request(
     request->width = 200, request->height = 150;
 }
 
+uint64_t fixture_hash(const struct pen_frame *frame)
+{
+    return pen_fnv(PEN_FNV_START, frame->planes[0].data, (size_t)frame->width * frame->height * 4);
+}
+
 uint64_t fixture_render(
     struct pen_renderer *renderer, const struct pen_request *request, struct pen_result *result)
 {
@@ -69,8 +74,7 @@ uint64_t fixture_render(
     struct pen_frame frame;
     if (!pen_renderer_render(renderer, request, &frame, result, &error))
         die(&error);
-    uint64_t hash =
-        pen_fnv(PEN_FNV_START, frame.planes[0].data, (size_t)frame.width * frame.height * 4);
+    uint64_t hash = fixture_hash(&frame);
     pen_frame_finish(&frame);
     return hash;
 }

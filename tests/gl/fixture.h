@@ -17,5 +17,7 @@ void fixture_request(
 /* Renders; returns the pixels of the first plane as a hash. Exits on failure. */
 uint64_t fixture_render(
     struct pen_renderer *renderer, const struct pen_request *request, struct pen_result *result);
+/* The pixels of the first plane, of four bytes each, as a hash. */
+uint64_t fixture_hash(const struct pen_frame *frame);
 /* Root of the mean squared difference of the first planes' bytes; both of four channels and one size. */
 double fixture_distance(const struct pen_frame *a, const struct pen_frame *b);

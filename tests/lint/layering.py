@@ -72,6 +72,7 @@ FLOORS = {
         ["techniques"],
         ["frame"],
         ["lane"],
+        ["residency"],
         ["renderer"],
         ["warm_up"],
         ["registry"],

@@ -19,7 +19,7 @@ struct kept_sums {
 struct kept_sums_store {
     struct kept_sums *items[KEPT_SUMS_MOST];
     uint32_t count;
-    uint64_t target_bytes, most_bytes, clock;
+    uint64_t most_bytes, clock;
 };
 
 struct kept_sums_store *kept_sums_store_create(uint64_t most_bytes)
@@ -196,9 +196,8 @@ struct kept_sum *kept_sum_open(
 const struct gl_target *kept_sum_target(struct technique_run *run, struct kept_sum *kept)
 {
     static const float zero[4] = {0};
-    uint64_t *before = gl_targets_charge(&run->ctx->kept_sums->target_bytes);
-    gl_target_fit(&kept->sum, GL_RGBA32F, run->width, run->height, 0, 1);
-    gl_targets_charge(before);
+    if (gl_target_fit(&kept->sum, GL_RGBA32F, run->width, run->height, 0, 1))
+        gl_texture_release_account(&kept->sum.texture); /* bytes_of() counts it */
     if (!kept->samples)
         gl_target_clear(&kept->sum, zero);
     return &kept->sum;

@@ -79,6 +79,8 @@ static void fit_layer(struct history_store *store, struct history_set *set, uint
         return;
     layer->mean = gl_texture_create(GL_RGBA32F, set->width, set->height, 0, 1);
     layer->state = gl_texture_create(GL_RGBA32F, set->width, set->height, 0, 1);
+    gl_texture_release_account(&layer->mean); /* layer_bytes() counts them */
+    gl_texture_release_account(&layer->state);
     const struct gl_texture *colors[] = {&layer->mean, &layer->state};
     layer->framebuffer = gl_framebuffer_create(colors, 2, NULL);
     store->bytes += layer_bytes(set->width, set->height);

@@ -3,8 +3,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define FIRST_TEXEL_BYTES 8 /* of a kind that none is there of: depth, and something beside it */
-
 /* What of a face and a request changes a shadow input: everything but the view and the emission. */
 struct face_key {
     mat4 world_to_light;
@@ -27,12 +25,16 @@ struct entry {
 struct shadow_cache {
     struct entry *entries; /* most recently made first; a handful, so a list will do */
     uint64_t bytes, clock;
+    struct gl_account
+        building; /* inputs that are not finished, and what is used up by making them */
     uint32_t built[SHADOW_CACHE_LANES]; /* in the frame of each lane */
 };
 
-struct shadow_cache *shadow_cache_create(void)
+struct shadow_cache *shadow_cache_create(
+    void (*make_room)(void *owner, uint64_t bytes), void *owner)
 {
     struct shadow_cache *cache = pen_alloc_zero(1, sizeof *cache);
+    cache->building = (struct gl_account){0, make_room, owner};
     return cache;
 }
 
@@ -74,15 +76,6 @@ static void use(struct shadow_cache *cache, struct entry *e, uint32_t lane)
     e->lanes |= 1u << lane;
 }
 
-/* What one is about to take: as much as the last of its kind and size. */
-static uint64_t expected_bytes(const struct shadow_cache *cache, const struct shadow_key *key)
-{
-    for (const struct entry *e = cache->entries; e; e = e->next)
-        if (e->key.size == key->size && !strcmp(e->key.kind, key->kind))
-            return e->bytes;
-    return (uint64_t)key->size * key->size * FIRST_TEXEL_BYTES;
-}
-
 const struct shadow_input *shadow_cache_get(struct technique_run *run, const struct shadow_key *key,
     shadow_build build, struct pen_error *error)
 {
@@ -97,16 +90,18 @@ const struct shadow_input *shadow_cache_get(struct technique_run *run, const str
             use(cache, e, run->ctx->lane);
             return &e->input;
         }
-    if (run->ctx->make_room)
-        run->ctx->make_room(run->ctx->room_owner, expected_bytes(cache, key));
     struct entry *e = pen_alloc_zero(1, sizeof *e);
     e->scene = run->scene;
     e->pose = run->scene->pose;
     e->face = face;
     e->key = *key;
+    struct gl_account *before = gl_textures_charge(&cache->building);
     bool ok = build(run, key, &e->input, error);
-    for (int i = 0; i < SHADOW_INPUT_TEXTURES; i++)
+    gl_textures_charge(before);
+    for (int i = 0; i < SHADOW_INPUT_TEXTURES; i++) {
+        gl_texture_release_account(&e->input.textures[i]);
         e->bytes += e->input.textures[i].bytes;
+    }
     cache->bytes += e->bytes;
     if (!ok) {
         free_entry(cache, e);
@@ -126,12 +121,12 @@ void shadow_cache_mark_built(const struct technique_ctx *ctx)
 
 uint64_t shadow_cache_bytes(const struct shadow_cache *cache)
 {
-    return cache->bytes;
+    return cache->bytes + cache->building.bytes;
 }
 
 void shadow_cache_trim(struct shadow_cache *cache, uint64_t bytes)
 {
-    while (cache->bytes > bytes) {
+    while (shadow_cache_bytes(cache) > bytes) {
         struct entry **oldest = NULL;
         for (struct entry **at = &cache->entries; *at; at = &(*at)->next)
             if (!(*at)->lanes && (!oldest || (*at)->last_use < (*oldest)->last_use))
@@ -160,10 +155,10 @@ void shadow_cache_drop_scene(struct shadow_cache *cache, const struct scene *sce
 void shadow_cache_begin_frame(const struct technique_ctx *ctx)
 {
     ctx->shadows->built[ctx->lane] = 0;
-    shadow_cache_end_frame(ctx);
+    shadow_cache_release(ctx);
 }
 
-void shadow_cache_end_frame(const struct technique_ctx *ctx)
+void shadow_cache_release(const struct technique_ctx *ctx)
 {
     for (struct entry *e = ctx->shadows->entries; e; e = e->next)
         e->lanes &= ~(1u << ctx->lane);

@@ -19,13 +19,16 @@ struct shadow_input {
     float values[64]; /* numbers that belong to it (windows of off-axis maps, ...) */
 };
 
-struct shadow_cache *shadow_cache_create(void);
+/* make_room is called before an input's textures take so many bytes. */
+struct shadow_cache *shadow_cache_create(
+    void (*make_room)(void *owner, uint64_t bytes), void *owner);
 void shadow_cache_destroy(struct shadow_cache *cache);
 
 typedef bool (*shadow_build)(struct technique_run *run, const struct shadow_key *key,
     struct shadow_input *input, struct pen_error *error);
 
-/* The input, built by `build` when it is not there. Valid until the end of the frame. */
+/* The input, built by `build` when it is not there. Valid until the lane's
+ * next shadow_cache_release. */
 const struct shadow_input *shadow_cache_get(struct technique_run *run, const struct shadow_key *key,
     shadow_build build, struct pen_error *error);
 
@@ -37,8 +40,9 @@ uint64_t shadow_cache_bytes(const struct shadow_cache *cache);
  * held. */
 void shadow_cache_trim(struct shadow_cache *cache, uint64_t bytes);
 void shadow_cache_drop_scene(struct shadow_cache *cache, const struct scene *scene);
-/* Between these, what the lane's frame uses is not trimmed. The first sets its counter to 0. */
+/* What a lane gets is not trimmed until it releases it: at the end of a frame, and before the next
+ * face of a light. The first of these releases too, and sets the lane's counter to 0. */
 void shadow_cache_begin_frame(const struct technique_ctx *ctx);
-void shadow_cache_end_frame(const struct technique_ctx *ctx);
+void shadow_cache_release(const struct technique_ctx *ctx);
 /* 1 when every input of the lane's frame was already there. */
 bool shadow_cache_all_reused(const struct technique_ctx *ctx);

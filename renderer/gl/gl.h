@@ -63,7 +63,8 @@
     F(READPIXELS, ReadPixels) F(SAMPLERPARAMETERF, SamplerParameterf) \
     F(SAMPLERPARAMETERFV, SamplerParameterfv) F(SAMPLERPARAMETERI, SamplerParameteri) \
     F(SCISSOR, Scissor) F(SHADERSOURCE, ShaderSource) F(STENCILFUNC, StencilFunc) \
-    F(STENCILOP, StencilOp) F(TEXTUREPARAMETERI, TextureParameteri) \
+    F(STENCILOP, StencilOp) F(TEXTUREBARRIER, TextureBarrier) \
+    F(TEXTUREPARAMETERI, TextureParameteri) \
     F(TEXTURESTORAGE2D, TextureStorage2D) F(TEXTURESTORAGE3D, TextureStorage3D) \
     F(TEXTURESTORAGE2DMULTISAMPLE, TextureStorage2DMultisample) \
     F(TEXTURESUBIMAGE2D, TextureSubImage2D) F(TEXTURESUBIMAGE3D, TextureSubImage3D) \

@@ -31,7 +31,9 @@ static inline bool patch_tiles(struct technique_run *run, uint32_t map_size, flo
     bool umbra, const struct gl_texture **tiles, struct pen_error *error)
 {
     return pass_classify(run,
-        &(struct classify_desc){
-            .map_size = map_size, .margin_texels = min_filter + 1, .umbra = umbra},
+        &(struct classify_desc){.map_size = map_size,
+            .margin_texels = min_filter + 1,
+            .umbra = umbra,
+            .bound = BOUND_PLANE},
         tiles, error);
 }

@@ -35,8 +35,10 @@ static bool record(struct technique_run *run, struct pen_error *error)
     if (!map || !min_max)
         return false;
     struct pass_texture pyramid = {UNIT_MIN_MAX, min_max->textures[0].name, GL_SAMPLE_NEAREST};
-    struct classify_desc classes = {
-        .map_size = params->map_size, .margin_texels = params->min_filter + 1, .umbra = true};
+    struct classify_desc classes = {.map_size = params->map_size,
+        .margin_texels = params->min_filter + 1,
+        .umbra = true,
+        .bound = BOUND_PLANE};
     const struct gl_texture *tiles;
     if (!pass_classify(run, &classes, &tiles, error))
         return false;
@@ -55,9 +57,10 @@ const struct technique technique_pcss = {
         .summary = "Finds the average blocker depth, derives the width of the penumbra from it and "
                    "filters depth comparisons over that width.",
         .citation = "R. Fernando, Percentage-closer soft shadows, SIGGRAPH 2005 sketches",
-        .artefacts = "One average depth merges near and far casters, which lets light through at "
-                     "the foot of a wall that reaches up to the light; thin blockers can be missed "
-                     "by the search; seen from the centre of the light only." BLENDED_GRAIN,
+        .artefacts =
+            "One average depth merges near and far casters, which lets light through where "
+            "several hide the light together; thin blockers can be missed by the search; "
+            "seen from the centre of the light only." BLENDED_GRAIN,
         .cost_class = PEN_COST_MEDIUM,
         .textured = false,
         .candidates = PEN_CANDIDATES("", "search_taps=32 filter_taps=64"),

@@ -2,18 +2,19 @@
 // where casters touch receivers is bias, the texels that a caster's edge does not cover, and
 // filters that reach past that edge or merge depths.
 #include "contact.glsl"
+#include "taps.glsl"
 #ifdef WINDOWS
 #include "window.glsl"
 #endif
 #include "bound.def"
+layout(binding = UNIT_SOURCE) uniform sampler2DArray answers; // where the bound is written
 
 const float UNBOUNDED = 60000.0; // of a half float
+const int PLANE_TAPS = 16;
 
-#ifdef WINDOWS
-// True when the plane of the four texels around the receiver hides all of the light: the light's
-// image by it, the hull of those of its corners, is blocked, and by nothing before that plane,
-// which another point of the light would see past.
-bool hidden_by_plane(Surface s, Contact c, ReceiverPlane plane, vec2 q, vec2 texel, vec2 size)
+// Light that the plane of four texels around the receiver leaves: a point of the light is hidden
+// when the map shows that plane where the way to the point crosses it.
+float past_plane(Surface s, Contact c, ReceiverPlane plane, vec2 q, vec2 texel, vec2 size)
 {
     vec2 base = floor(c.at);
     Caster caster = Caster(vec2(0.0), 0.0, 0.0, -1.0);
@@ -22,45 +23,49 @@ bool hidden_by_plane(Surface s, Contact c, ReceiverPlane plane, vec2 q, vec2 tex
         add_caster(c, corner, textureGather(shadow_map, corner / size), caster);
     }
     float before = c.plane.depth - caster.depth;
-    if (caster.distance < 0.0 || before <= c.rounding)
-        return false;
-    // A point of the light at l has its image at l * scale * (depth of the receiver - depth there).
-    vec2 scale = light_filter_extent(light_linear(caster.depth), s.p.z) / before,
+    // A point of the light at e has its image at e * scale * (depth of the receiver - depth there).
+    vec2 scale = light_filter_extent(light_linear(caster.depth), s.p.z),
          slope = caster.slope / texel;
-    vec2 low = vec2(0.0), high = vec2(0.0);
-    bool beyond = true; // all of the light is, seen from the receiver
-    for (int i = 0; i < 4; i++) {
-        vec2 u = scale * vec2((i & 1) * 2 - 1, (i & 2) - 1);
-        float closing = 1.0 + dot(slope, u);
-        beyond = beyond && closing > 1e-3;
-        vec2 image = u * before / max(closing, 1e-3);
-        low = min(low, image);
-        high = max(high, image);
+    bool found = caster.distance >= 0.0 && before > c.rounding;
+    // In a penumbra the light's corners mostly tell.
+    int count = found ? 4 : 0;
+    float left = 0.0, all = 0.0;
+    Taps taps = taps_begin(PLANE_TAPS, vec2(0.5));
+    for (int i = 0; i < count; i++) {
+        bool corner = i < 4;
+        vec2 e = corner ? vec2((i & 1) * 2 - 1, (i & 2) - 1) : taps_next(taps);
+        e *= corner && light_shape == SHAPE_DISK ? 0.70710678 : 1.0;
+        float closing = 1.0 + dot(slope, scale * e) / before;
+        vec2 image = scale * e / max(closing, 1e-3);
+        vec2 texels = floor(c.at + image / texel) + 0.5 - c.at;
+        float there = c.plane.depth + dot(c.plane.gradient, texels),
+              shield = caster.depth + dot(caster.slope, texels);
+        float z = texture(shadow_map, light_uv(q + image)).r;
+        float near = 0.25 * (there - shield);
+        bool shown = closing > 1e-3 && abs(z - shield) < max(near, c.rounding);
+        bool above = horizon_height(s.p, s.n, e) > 0.0;
+        left += above && !shown ? 1.0 : 0.0;
+        all += above ? 1.0 : 0.0;
+        count = i == 3 && left < 2.0 ? 4 + PLANE_TAPS : count;
     }
-    vec2 middle = 0.5 * (low + high), extent = 0.5 * (high - low) + texel;
-    ReceiverPlane there = plane;
-    there.depth += dot(plane.gradient, middle);
-    ReceiverPlane shield = ReceiverPlane(caster.depth + dot(slope, middle), slope);
-    float bias = 4.0 * c.rounding + 0.02 * before;
-    return beyond &&
-           window_class(q + middle, extent, there, c.rounding, 0.0, size) == WINDOW_BLOCKED &&
-           window_class(q + middle, extent, shield, bias, 0.0, size) == WINDOW_LIT;
+    return count > 4 ? min(2.0 * left / max(all, 1.0), 1.0) : 1.0;
 }
-#endif
 
 vec4 visibility(Surface s)
 {
     vec2 size = vec2(textureSize(shadow_map, 0)), texel = light_texel(shadow_map);
     vec2 q = light_project(s.p);
-    if (!contact_is_known(s))
+    // A pixel's own answer is read, and then written once.
+    float answer = texelFetch(answers, ivec3(s.pixel, bound.kind.y), 0).a;
+    if (answer <= 0.0 || !contact_is_known(s))
         return vec4(UNBOUNDED);
     ReceiverPlane plane = receiver_plane(s.p, s.n);
     float pixel = view.forward.w / (s.depth * view.eye.w);
     pixel *= light_parallel ? 1.0 : light.near_z / s.p.z;
     float reach = bound.reach.x + bound.reach.y * pixel / min(texel.x, texel.y);
     // Windows are proved in aligned cells, which may reach past the contact where they do not.
-    Contact c = contact_of(
-        s, plane, q, texel, bound.kind.x == BOUND_CONTACT ? reach + 2.0 : 2.0 * reach + 4.0);
+    bool cells = bound.kind.x == BOUND_KERNEL || bound.kind.x == BOUND_LIGHT;
+    Contact c = contact_of(s, plane, q, texel, cells ? 2.0 * reach + 4.0 : reach + 2.0);
 
     Around a = look_around(s, c, look_beside(s, c, texel));
     float most = a.left;
@@ -82,13 +87,12 @@ vec4 visibility(Surface s)
             window_class(q, window, plane, c.rounding, 0.0, size) == WINDOW_BLOCKED)
             most = 0.0;
     }
-    int shields = bound.kind.x == BOUND_LIGHT && a.all_block && most > 0.0 ? 1 : 0;
-    for (int i = 0; i < shields; i++) {
-        c.reach = 1e6;
-        if (hidden_by_plane(s, c, plane, q, texel, size))
-            most = 0.0;
-    }
 #endif
+    int planes = a.all_block && most > 0.0 ? 1 : 0;
+    planes = bound.kind.x == BOUND_LIGHT || bound.kind.x == BOUND_PLANE ? planes : 0;
+    c.reach = planes > 0 ? 1e6 : c.reach;
+    for (int i = 0; i < planes; i++)
+        most = min(most, past_plane(s, c, plane, q, texel, size));
     if (light.textured != 0 && most > 0.0)
         most = 1.0; // what is left has its own colours
     return most < 1.0 ? scalar_visibility(most) : vec4(UNBOUNDED);

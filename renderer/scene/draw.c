@@ -2,6 +2,7 @@
 #include "renderer/scene/scene.h"
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 static void bind_textures(struct scene *s, uint32_t material)
 {
@@ -40,6 +41,66 @@ static bool needs_textures(const struct scene_pass *pass, const struct scene_gro
     return group->alpha || (pass->full && group->textured);
 }
 
+struct placed {
+    float away;
+    uint32_t instance;
+};
+
+static int compare_placed(const void *a, const void *b)
+{
+    const struct placed *x = a, *y = b;
+    if (x->away != y->away)
+        return x->away < y->away ? -1 : 1;
+    return x->instance < y->instance ? -1 : x->instance > y->instance;
+}
+
+/* How far the middle of an instance is from the eye; its square, or without one along the view. */
+static float distance_of(const struct scene *s, const struct cull_view *view, uint32_t instance)
+{
+    const float(*b)[3] = s->instance_bounds[instance];
+    float sum = 0;
+    for (int c = 0; c < 3; c++) {
+        float middle = 0.5f * (b[0][c] + b[1][c]), to = middle - view->eye[c];
+        sum += view->parallel ? middle * view->eye[c] : to * to;
+    }
+    return sum == sum ? sum : 0;
+}
+
+static void sort_by_distance(struct scene *s, const struct cull_view *view)
+{
+    struct placed *placed = pen_alloc(s->blob.instance_count + 1, sizeof *placed);
+    for (uint32_t g = 0; g < s->group_count; g++) {
+        const struct scene_group *group = &s->groups[g];
+        if (!group->alpha)
+            continue;
+        for (uint32_t i = 0; i < group->count; i++) {
+            uint32_t instance = s->order[group->first + i];
+            placed[i] = (struct placed){distance_of(s, view, instance), instance};
+        }
+        qsort(placed, group->count, sizeof *placed, compare_placed);
+        for (uint32_t i = 0; i < group->count; i++)
+            s->nearest[group->first + i] = placed[i].instance;
+    }
+    free(placed);
+    memcpy(s->nearest_eye, view->eye, sizeof s->nearest_eye);
+    s->nearest_parallel = view->parallel;
+    s->nearest_known = true;
+}
+
+/* The order in which a group's instances are drawn. Where a map only takes depths and looks up alpha for
+ * them, the nearest come first: what they hide is not looked up, and what a stack of blended surfaces
+ * costs does not grow with its height. */
+static const uint32_t *order_of(struct scene *s, const struct cull_view *view,
+    const struct scene_pass *pass, const struct scene_group *group)
+{
+    if (pass->full || !group->alpha || group->count < 2)
+        return s->order + group->first;
+    if (!s->nearest_known || s->nearest_parallel != view->parallel ||
+        memcmp(s->nearest_eye, view->eye, sizeof s->nearest_eye) != 0)
+        sort_by_distance(s, view);
+    return s->nearest + group->first;
+}
+
 /* The commands of one group within a piece of a drawing. */
 struct run {
     uint32_t group, first, count;
@@ -65,8 +126,9 @@ static uint64_t gather(struct scene *s, const struct cull_view *view, const stru
         piece->more = is_new && *run_count > 0 && isfinite(piece->most);
         if (piece->more)
             break;
+        const uint32_t *order = order_of(s, view, pass, group);
         for (; piece->instance < group->count && !piece->more; piece->instance++) {
-            uint32_t instance = s->order[group->first + piece->instance];
+            uint32_t instance = order[piece->instance];
             if (!pass->hidden || !pass->hidden[instance])
                 triangles += cull_instance(view, instance, run->cull_back, &list, piece);
             if (piece->more)

@@ -78,6 +78,7 @@ void scene_direction(const double from[3], const double to[3], float direction[3
 static void bound_instances(struct scene *s)
 {
     uint64_t left = BOUND_BUDGET;
+    s->nearest_known = false;
     if (!s->instance_bounds)
         s->instance_bounds = pen_alloc_zero(s->file.instance_count, sizeof *s->instance_bounds);
     if (s->poses) { /* it knows what moved */

@@ -254,11 +254,13 @@ static void make_groups(struct scene *s)
     uint32_t n = s->blob.instance_count;
     uint64_t meshlets = 0;
     free(s->order);
+    free(s->nearest);
     free(s->groups);
     free(s->command_room);
     s->group_count = 0;
     struct sortable *sorted = pen_alloc_zero(n + 1, sizeof *sorted);
     s->order = pen_alloc_zero(n + 1, sizeof *s->order);
+    s->nearest = pen_alloc_zero(n + 1, sizeof *s->nearest);
     s->groups = pen_alloc_zero(n + 1, sizeof *s->groups);
     for (uint32_t i = 0; i < n; i++) {
         sorted[i] = (struct sortable){state_key(s, i), i};
@@ -434,6 +436,7 @@ void scene_destroy(struct scene *s)
     free(s->samplers);
     free(s->instance_bounds);
     free(s->order);
+    free(s->nearest);
     free(s->groups);
     free(s->command_room);
     free(s->meshlet_areas);

@@ -52,6 +52,10 @@ struct scene {
     struct gl_texture *images;
     GLuint *samplers; /* one per blob texture */
     uint32_t *order;  /* instances sorted by state */
+    uint32_t *
+        nearest; /* the same, each group's by their distance from an eye, where it was last wanted */
+    float nearest_eye[3];
+    bool nearest_parallel, nearest_known;
     struct scene_group *groups;
     uint32_t group_count;
     struct gl_states states;

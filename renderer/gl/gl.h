@@ -17,6 +17,7 @@
     F(CLEARNAMEDBUFFERDATA, ClearNamedBufferData) \
     F(CLEARTEXIMAGE, ClearTexImage) F(CLIPCONTROL, ClipControl) F(COLORMASK, ColorMask) \
     F(COMPILESHADER, CompileShader) F(COPYIMAGESUBDATA, CopyImageSubData) \
+    F(BLITNAMEDFRAMEBUFFER, BlitNamedFramebuffer) \
     F(CREATEBUFFERS, CreateBuffers) F(CREATEFRAMEBUFFERS, CreateFramebuffers) \
     F(CREATEPROGRAM, CreateProgram) F(CREATEQUERIES, CreateQueries) \
     F(CREATESAMPLERS, CreateSamplers) F(CREATESHADER, CreateShader) \

@@ -40,6 +40,49 @@ static bool run(struct technique_ctx *ctx, const struct gl_texture *from, GLuint
         error);
 }
 
+/* As GenerateTextureMipmap makes them, but one after the other: llvmpipe keeps alive what it draws from
+ * and into until it has as many drawings under way again, and of an array those are hundreds. */
+static bool step_by_step(
+    struct technique_ctx *ctx, const struct gl_texture *t, struct pen_error *error)
+{
+    GLuint framebuffers[2];
+    bool ok = true;
+    gl.CreateFramebuffers(2, framebuffers);
+    for (uint32_t i = 0, layers = t->layers ? t->layers : 1; ok && i < layers * (t->levels - 1);
+         i++) {
+        GLint sizes[2][2];
+        for (uint32_t k = 0; k < 2; k++) {
+            uint32_t level = i / layers + k, layer = i % layers;
+            sizes[k][0] = (GLint)(t->width >> level ? t->width >> level : 1);
+            sizes[k][1] = (GLint)(t->height >> level ? t->height >> level : 1);
+            if (t->layers)
+                gl.NamedFramebufferTextureLayer(
+                    framebuffers[k], GL_COLOR_ATTACHMENT0, t->name, (GLint)level, (GLint)layer);
+            else
+                gl.NamedFramebufferTexture(
+                    framebuffers[k], GL_COLOR_ATTACHMENT0, t->name, (GLint)level);
+        }
+        gl.BlitNamedFramebuffer(framebuffers[0], framebuffers[1], 0, 0, sizes[0][0], sizes[0][1], 0,
+            0, sizes[1][0], sizes[1][1], GL_COLOR_BUFFER_BIT, GL_LINEAR);
+        ok = pass_turn_inside(ctx, error);
+    }
+    gl.DeleteFramebuffers(2, framebuffers);
+    return ok;
+}
+
+bool pass_mips(struct technique_ctx *ctx, const struct gl_texture *texture, const char *name,
+    struct pen_error *error)
+{
+    bool ok = true;
+    gl_timer_begin(&ctx->timer, PEN_STAGE_SHADOW, name);
+    if (ctx->software)
+        ok = step_by_step(ctx, texture, error);
+    else
+        gl.GenerateTextureMipmap(texture->name);
+    gl_timer_end(&ctx->timer);
+    return ok && pass_turn(ctx, error);
+}
+
 bool pass_blur(struct technique_ctx *ctx, const struct gl_texture *texture, uint32_t radius,
     struct pen_error *error)
 {
@@ -55,11 +98,5 @@ bool pass_blur(struct technique_ctx *ctx, const struct gl_texture *texture, uint
         gl.DeleteFramebuffers(2, framebuffers);
         gl_texture_destroy(&between);
     }
-    if (ok && texture->levels > 1) {
-        gl_timer_begin(&ctx->timer, PEN_STAGE_SHADOW, "mips");
-        gl.GenerateTextureMipmap(texture->name);
-        gl_timer_end(&ctx->timer);
-        ok = pass_turn(ctx, error);
-    }
-    return ok;
+    return ok && (texture->levels == 1 || pass_mips(ctx, texture, "mips", error));
 }

@@ -1,4 +1,5 @@
 #include "renderer/passes/map/convolution.h"
+#include "renderer/passes/map/blur.h"
 #include "renderer/passes/draw/screen.h"
 #include "renderer/passes/draw/turn.h"
 #include "renderer/passes/map/depth_map.h"
@@ -111,10 +112,7 @@ static bool fill(struct technique_run *run, const struct gl_texture *map, struct
     gl_texture_destroy(&sums);
     if (tables)
         return ok;
-    gl_timer_begin(&run->ctx->timer, PEN_STAGE_SHADOW, "convolution mips");
-    gl.GenerateTextureMipmap(array->name);
-    gl_timer_end(&run->ctx->timer);
-    return ok && pass_turn(run->ctx, error);
+    return ok && pass_mips(run->ctx, array, "convolution mips", error);
 }
 
 static bool build(struct technique_run *run, const struct shadow_key *key,

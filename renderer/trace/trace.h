@@ -7,7 +7,6 @@
  * and so do those behind it of what is left. Textures are read at their finest level. */
 #pragma once
 #include "renderer/blob/pscene.h"
-#include <math.h>
 
 /* World-space triangles, and the hierarchies that the last few lights needed: one for all of them
  * or, front_only, one per light, because it leaves out the triangles that turn their back to it. One
@@ -172,7 +171,7 @@ static inline uint16_t pen_trace_half(float x)
     union {
         float value;
         uint32_t bits;
-    } f = {fminf(x, 65504.0f)};
+    } f = {x < 65504.0f ? x : 65504.0f};
     if (f.value < 0x1p-14f) /* subnormal: its unit is 2^-24 */
         return (uint16_t)(f.value * 0x1p24f + 0.5f);
     return (uint16_t)((f.bits - 0x38000000u + 0xfffu + (f.bits >> 13 & 1)) >> 13);

@@ -123,15 +123,15 @@ static void check_against_many_rays(void)
         const char *light;
         double most;
     } rows[] = {
-        {"", 0.06},
-        {"&light.type=disk&light.position=2,4,3&light.radius=0.5", 0.06},
-        {"&light.type=sphere&light.position=2,3,3&light.radius=0.3", 0.06},
-        {"&light.type=sun&light.position=2,4,3&light.angular_diameter_deg=4", 0.06},
+        {"", 0.075},
+        {"&light.type=disk&light.position=2,4,3&light.radius=0.5", 0.075},
+        {"&light.type=sphere&light.position=2,3,3&light.radius=0.3", 0.075},
+        {"&light.type=sun&light.position=2,4,3&light.angular_diameter_deg=4", 0.075},
         {"&lights.0.type=rect&lights.0.position=2,4,3&lights.1.type=disk&lights.1.position=-2,3,1",
-            0.06},
+            0.075},
         {"&light.type=rect&light.position=2,4,3&light.width=2&light.height=1"
          "&light.texture.pattern=checker",
-            0.06},
+            0.075},
     };
     static const char *const methods[] = {
         "raytraced&samples=256&adaptive=false", "denoised", "pcss"};

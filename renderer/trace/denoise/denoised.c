@@ -30,6 +30,10 @@ static void make_points(struct denoise *d, uint32_t seed)
             uint32_t at = (place * n + stratum) * TRACE_LANES + lane;
             d->points[at] = (int32_t)(u ^ 0x80000000u);
             d->points[all + at] = (int32_t)(v ^ 0x80000000u);
+            if (stratum != morton % n)
+                continue;
+            d->look[0][place][lane] = d->points[at];
+            d->look[1][place][lane] = d->points[all + at];
         }
     }
 }
@@ -215,7 +219,10 @@ bool pen_trace_denoised(struct pen_trace_scene *scene, const struct pen_trace_li
     }
     lay_out(&d, room);
     make_points(&d, job->seed);
-    ok = trace_emitter_average(&d.emitter, d.mean_emission, error) && run_stages(&d, error);
+    ok = trace_emitter_average(&d.emitter, d.mean_emission, error);
+    for (int c = 0; c < 4; c++)
+        d.lit[c] = pen_trace_half(c < 3 ? d.mean_emission[c] : 1);
+    ok = ok && run_stages(&d, error);
     if (ok && stats) {
         double seconds = trace_seconds() - start;
         *stats = (struct pen_trace_stats){.rays = d.rays,

@@ -111,52 +111,67 @@ static uint8_t radius_at(const struct denoise *d, uint32_t x, uint32_t y)
     return d->capped && d->radius[block] < NARROW ? NARROW : d->radius[block];
 }
 
-void denoise_filter_x(void *context, uint32_t tile)
-{
-    struct denoise *d = context;
-    uint32_t at[2], width = d->job->width, height = d->job->height;
-    denoise_tile_at(d, tile, at);
-    for (uint32_t y = at[1]; y < at[1] + TILE && y < height; y++)
-        for (uint32_t x = at[0]; x < at[0] + TILE && x < width; x++) {
-            size_t first = (size_t)d->parts * (y * width + x);
-            const uint32_t pixel[2] = {x, y};
-            uint8_t radius = radius_at(d, x, y);
-            if (radius)
-                filter_pixel(d, d->value[0], pixel, radius, 0, d->value[1] + first);
-            else if (d->near[denoise_half(d, x, y)])
-                memcpy(d->value[1] + first, d->value[0] + first, d->parts * sizeof(float));
-        }
-}
-
 static void put(struct denoise *d, uint32_t pixel, const float *value, float scale)
 {
     uint16_t *out = d->halves + 4 * (size_t)pixel;
-    float a = fminf(fmaxf(scale * value[d->parts - 1], 0), 1);
-    for (int c = 0; c < 3; c++)
-        out[c] = pen_trace_half(d->parts == 4 ? fmaxf(scale * value[c], 0) : a);
-    out[3] = pen_trace_half(a);
+    float a = scale * value[d->parts - 1];
+    out[3] = pen_trace_half(a < 1 ? a : 1);
+    for (uint32_t c = 0; c < 3; c++)
+        out[c] = d->parts == 4 ? pen_trace_half(scale * value[c]) : out[3];
+}
+
+/* Without work: as the pre-test said. */
+static void put_half(struct denoise *d, uint32_t x0, uint32_t y0)
+{
+    const float *depths = d->job->view->depths;
+    uint32_t width = d->job->width, height = d->job->height;
+    bool umbra = d->verdicts[denoise_half(d, x0, y0)] == UMBRA;
+    for (uint32_t y = y0; y < y0 + HALF && y < height; y++)
+        for (uint32_t x = x0; x < x0 + HALF && x < width; x++) {
+            size_t pixel = (size_t)y * width + x;
+            bool dark = umbra && depths[pixel] > 0;
+            memcpy(d->halves + 4 * pixel, dark ? d->dark : d->lit, sizeof d->lit);
+        }
+}
+
+static void filter_half(struct denoise *d, uint32_t x0, uint32_t y0, int axis)
+{
+    uint32_t width = d->job->width, height = d->job->height;
+    for (uint32_t y = y0; y < y0 + HALF && y < height; y++)
+        for (uint32_t x = x0; x < x0 + HALF && x < width; x++) {
+            size_t pixel = (size_t)y * width + x, first = d->parts * pixel;
+            const uint32_t at[2] = {x, y};
+            uint8_t radius = radius_at(d, x, y);
+            float filtered[4], *out = axis ? filtered : d->value[1] + first;
+            if (radius)
+                filter_pixel(d, d->value[axis], at, radius, axis, out);
+            else if (!axis)
+                memcpy(out, d->value[0] + first, d->parts * sizeof *out);
+            if (axis)
+                put(d, (uint32_t)pixel, radius ? out : d->value[1] + first, d->fade[pixel]);
+        }
+}
+
+static void filter_tile(struct denoise *d, uint32_t tile, int axis)
+{
+    uint32_t at[2];
+    denoise_tile_at(d, tile, at);
+    for (uint32_t y = at[1]; y < at[1] + TILE && y < d->job->height; y += HALF)
+        for (uint32_t x = at[0]; x < at[0] + TILE && x < d->job->width; x += HALF) {
+            uint32_t half = denoise_half(d, x, y);
+            if (d->work[half] || (!axis && d->near[half]))
+                filter_half(d, x, y, axis);
+            else if (axis)
+                put_half(d, x, y);
+        }
+}
+
+void denoise_filter_x(void *context, uint32_t tile)
+{
+    filter_tile(context, tile, 0);
 }
 
 void denoise_filter_y(void *context, uint32_t tile)
 {
-    struct denoise *d = context;
-    uint32_t at[2], width = d->job->width, height = d->job->height;
-    denoise_tile_at(d, tile, at);
-    for (uint32_t y = at[1]; y < at[1] + TILE && y < height; y++)
-        for (uint32_t x = at[0]; x < at[0] + TILE && x < width; x++) {
-            uint32_t pixel = y * width + x;
-            const uint32_t place[2] = {x, y};
-            const float one[4] = {d->mean_emission[0], d->mean_emission[1], d->mean_emission[2], 1};
-            float out[4];
-            if (!d->work[denoise_half(d, x, y)]) {
-                bool umbra =
-                    d->verdicts[denoise_half(d, x, y)] == UMBRA && d->job->view->depths[pixel] > 0;
-                put(d, pixel, d->parts == 4 ? one : one + 3, umbra ? 0 : 1);
-                continue;
-            }
-            uint8_t radius = radius_at(d, x, y);
-            if (radius)
-                filter_pixel(d, d->value[1], place, radius, 1, out);
-            put(d, pixel, radius ? out : d->value[1] + (size_t)d->parts * pixel, d->fade[pixel]);
-        }
+    filter_tile(context, tile, 1);
 }

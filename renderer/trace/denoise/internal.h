@@ -14,6 +14,7 @@ struct denoise {
     const struct pen_trace_job *job;
     const struct pen_trace_denoising *how;
     uint16_t *halves;
+    uint16_t lit[4], dark[4]; /* what is wholly so, in halves */
     struct trace_emitter emitter;
     float mean_emission[3];
     float size;     /* of the light or the smallest thing in its picture, m; parallel: tangent */
@@ -22,13 +23,14 @@ struct denoise {
     uint32_t parts; /* floats per value: 1: a; 4: rgb, too */
     uint32_t tiles_x, tiles, halves_x, halves_y, blocks_x, blocks_y;
     uint32_t samples, refine, more_low_bits;
-    bool capped;               /* what is narrow is filtered all the same */
-    int32_t *points;           /* u and v: of each block of 4 in a pattern, sample and lane */
-    int32_t *more_points;      /* u and v: `refine` each */
-    uint8_t *verdicts, *marks; /* per half: enum verdict */
-    uint8_t *work, *near;      /* per half: it gets rays; it may be looked at from there */
-    float *reach;              /* per block: px; INFINITY: nothing is in the way */
-    uint8_t *radius;           /* per block, of the filter: px */
+    bool capped;                     /* what is narrow is filtered all the same */
+    int32_t *points;                 /* u and v: of each block of 4 in a pattern, sample and lane */
+    int32_t look[2][4][TRACE_LANES]; /* u and v: of them one for each pixel, of unlike strata */
+    int32_t *more_points;            /* u and v: `refine` each */
+    uint8_t *verdicts, *marks;       /* per half: enum verdict */
+    uint8_t *work, *near;            /* per half: it gets rays; it may be looked at from there */
+    float *reach;                    /* per block: px; INFINITY: nothing is in the way */
+    uint8_t *radius;                 /* per block, of the filter: px */
     /* Per pixel: */
     float *value[2];      /* mean over samples above the horizon; the second: filtered in x */
     float *fade;          /* where there is work */

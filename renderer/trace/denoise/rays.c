@@ -92,24 +92,28 @@ static void set_value(struct denoise *d, uint32_t pixel, const float rgb[3], flo
 
 static void set_normal(struct denoise *d, uint32_t pixel, const float n[3], float length)
 {
-    for (int c = 0; c < 3; c++)
-        d->normals[pixel][c] = (int8_t)lrintf(127 * n[c] / length);
+    float scale = 127 / length;
+    for (int c = 0; c < 3; c++) /* to the next one */
+        d->normals[pixel][c] = (int8_t)((int)(scale * n[c] + 128.5f) - 128);
 }
 
-/* A block without work is as its half: lit or in umbra. */
-static void fill_block(struct denoise *d, uint32_t x0, uint32_t y0)
+/* A block is all lit or all in umbra. */
+static void fill_block(struct denoise *d, uint32_t x0, uint32_t y0, bool umbra)
 {
     static const float zero[3];
+    const struct pen_trace_view *view = d->job->view;
     uint32_t width = d->job->width, height = d->job->height;
-    bool umbra = d->verdicts[denoise_half(d, x0, y0)] == UMBRA;
-    bool near = d->near[denoise_half(d, x0, y0)];
-    for (uint32_t y = y0; y < y0 + BLOCK && y < height && near; y++)
+    for (uint32_t y = y0; y < y0 + BLOCK && y < height; y++)
         for (uint32_t x = x0; x < x0 + BLOCK && x < width; x++) {
-            float p[3], n[3] = {0}, length = 1;
-            if (pen_trace_view_read(d->job->view, d->job->eye, width, y * width + x, p, n))
+            uint32_t pixel = y * width + x;
+            bool is = view->depths[pixel] > 0, dark = is && umbra;
+            float n[3] = {0}, length = 1;
+            if (is) {
+                trace_normal_decode(view->normals + 4 * (size_t)pixel, n);
                 length = sqrtf(trace_dot(n, n));
-            set_value(d, y * width + x, umbra ? zero : d->mean_emission, umbra ? 0 : 1);
-            set_normal(d, y * width + x, n, length);
+            }
+            set_value(d, pixel, dark ? zero : d->mean_emission, dark ? 0 : 1);
+            set_normal(d, pixel, n, length);
         }
 }
 
@@ -139,40 +143,83 @@ static float horizon_fade(const struct denoise *d, const struct trace_packet *pa
     return d->emitter.type == PEN_TRACE_POINT ? 1 : fminf(4 * share, 1);
 }
 
+/* Sixteen receivers, by lane; those that there are not are turned from all light. */
+struct block {
+    uint32_t x, y; /* its first pixel */
+    struct trace_receiver receivers[TRACE_LANES];
+    bool is[TRACE_LANES];
+    struct trace_packet packet;
+};
+
+static void load_block(struct denoise *d, uint32_t x0, uint32_t y0, struct block *b)
+{
+    uint32_t width = d->job->width, count = 0;
+    memset(b->receivers, 0, sizeof b->receivers);
+    b->x = x0;
+    b->y = y0;
+    for (uint32_t lane = 0; lane < TRACE_LANES; lane++) {
+        uint32_t x = x0 + lane % BLOCK, y = y0 + lane / BLOCK;
+        b->is[lane] = x < width && y < d->job->height &&
+                      trace_receiver_read(
+                          d->job, d->pieces.scene->extent, y * width + x, &b->receivers[lane]);
+        count += b->is[lane];
+    }
+    trace_packet_load(&b->packet, &d->emitter, b->receivers, TRACE_LANES, 0, 0);
+    atomic_fetch_add(&d->worked, count);
+}
+
+/* Beside what the pre-test finds mixed: one ray of each pixel may confirm what it says of the half. */
+static bool is_as_half(struct denoise *d, struct block *b, uint32_t place, uint8_t verdict)
+{
+    struct trace_sums sums = {0};
+    struct trace_block look = {d->look[0][place], d->look[1][place], 1};
+    if (verdict == MIXED || verdict == NO_RECEIVER || d->samples == 1)
+        return false;
+    trace_packet_run(
+        &d->emitter, &b->packet, &look, (d->mode & TRACE_SHARES) | TRACE_OWN_POINTS, &sums);
+    atomic_fetch_add(&d->rays, sums.rays);
+    for (uint32_t lane = 0; lane < TRACE_LANES; lane++) {
+        if (!b->is[lane])
+            continue;
+        if (verdict == UMBRA ? sums.count[lane] || sums.visible[lane] > 0
+                             : !sums.count[lane] || least_height(d, &b->packet, lane) <= 0)
+            return false;
+    }
+    return true;
+}
+
 static void sample_block(struct denoise *d, uint32_t x0, uint32_t y0)
 {
     static const float zero[3];
-    struct trace_receiver receivers[TRACE_LANES] = {0};
-    struct trace_packet packet;
+    struct block b;
     struct trace_sums sums = {0};
-    uint32_t width = d->job->width, height = d->job->height, count = 0;
+    uint32_t width = d->job->width, height = d->job->height;
     uint32_t place = (y0 / BLOCK & 1) * 2 + (x0 / BLOCK & 1), all = 4 * TRACE_LANES * d->samples;
     const int32_t *u = d->points + (size_t)place * TRACE_LANES * d->samples;
     struct trace_block block = {u, u + all, d->samples};
-    bool is[TRACE_LANES];
-    for (uint32_t lane = 0; lane < TRACE_LANES; lane++) {
-        uint32_t x = x0 + lane % BLOCK, y = y0 + lane / BLOCK, pixel = y * width + x;
-        is[lane] = x < width && y < height &&
-                   trace_receiver_read(d->job, d->pieces.scene->extent, pixel, &receivers[lane]);
-        count += is[lane];
-    }
-    trace_packet_load(&packet, &d->emitter, receivers, TRACE_LANES, 0, 0);
-    trace_packet_run(&d->emitter, &packet, &block, d->mode | TRACE_OWN_POINTS, &sums);
+    uint8_t verdict = d->verdicts[denoise_half(d, x0, y0)];
+    load_block(d, x0, y0, &b);
+    bool same = is_as_half(d, &b, place, verdict);
+    if (same)
+        fill_block(d, x0, y0, verdict == UMBRA);
+    else
+        trace_packet_run(&d->emitter, &b.packet, &block, d->mode | TRACE_OWN_POINTS, &sums);
     for (uint32_t lane = 0; lane < TRACE_LANES; lane++) {
         uint32_t x = x0 + lane % BLOCK, y = y0 + lane / BLOCK, pixel = y * width + x;
         if (x >= width || y >= height)
             continue;
-        d->above[pixel] = 0;
-        d->fade[pixel] = is[lane] ? horizon_fade(d, &packet, lane) : 1;
-        set_normal(d, pixel, receivers[lane].normal, 1); /* 0 where there is none */
-        set_value(d, pixel, is[lane] ? zero : d->mean_emission, is[lane] ? 0 : 1);
-        if (!is[lane])
+        d->above[pixel] = (uint8_t)(same ? d->samples : 0);
+        d->fade[pixel] = b.is[lane] && !same ? horizon_fade(d, &b.packet, lane) : 1;
+        if (same)
+            continue;
+        set_normal(d, pixel, b.receivers[lane].normal, 1); /* 0 where there is none */
+        set_value(d, pixel, b.is[lane] ? zero : d->mean_emission, b.is[lane] ? 0 : 1);
+        if (!b.is[lane])
             continue;
         add_value(d, pixel, &sums, lane);
         d->above[pixel] = (uint8_t)sums.above[lane];
     }
     atomic_fetch_add(&d->rays, sums.rays);
-    atomic_fetch_add(&d->worked, count);
 }
 
 void denoise_sample(void *context, uint32_t tile)
@@ -182,10 +229,11 @@ void denoise_sample(void *context, uint32_t tile)
     denoise_tile_at(d, tile, at);
     for (uint32_t y = at[1]; y < at[1] + TILE && y < d->job->height; y += BLOCK)
         for (uint32_t x = at[0]; x < at[0] + TILE && x < d->job->width; x += BLOCK) {
-            if (!d->work[denoise_half(d, x, y)])
-                fill_block(d, x, y);
-            else if (!trace_is_late(&d->pieces))
+            uint32_t half = denoise_half(d, x, y);
+            if (d->work[half] && !trace_is_late(&d->pieces))
                 sample_block(d, x, y);
+            else if (d->near[half])
+                fill_block(d, x, y, d->verdicts[half] == UMBRA);
         }
 }
 

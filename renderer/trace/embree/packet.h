@@ -52,6 +52,8 @@ struct trace_receiver {
     uint32_t pixel;
 };
 
+/* As octahedral.glsl has it; of any length. */
+void trace_normal_decode(const uint16_t e[2], float n[3]);
 /* Receiver `pixel` of a job; false when it is none. `extent`: the scene's. */
 bool trace_receiver_read(
     const struct pen_trace_job *job, float extent, uint32_t pixel, struct trace_receiver *out);

@@ -2,11 +2,10 @@
 #include "renderer/trace/embree/packet.h"
 #include <math.h>
 
-/* As octahedral.glsl has it. */
-static void decode_normal(const uint16_t e[2], float n[3])
+void trace_normal_decode(const uint16_t e[2], float n[3])
 {
     float x = (float)e[0] * (2.0f / 65535) - 1, y = (float)e[1] * (2.0f / 65535) - 1;
-    float z = 1 - fabsf(x) - fabsf(y), fold = fmaxf(-z, 0);
+    float z = 1 - fabsf(x) - fabsf(y), fold = z < 0 ? -z : 0;
     n[0] = x + (x >= 0 ? -fold : fold);
     n[1] = y + (y >= 0 ? -fold : fold);
     n[2] = z;
@@ -21,7 +20,7 @@ bool pen_trace_view_read(const struct pen_trace_view *view, const float eye[3], 
         return false;
     for (int c = 0; c < 3; c++)
         position[c] = eye[c] + (view->first[c] + x * view->right[c] + y * view->down[c]) * scale;
-    decode_normal(view->normals + 4 * (size_t)pixel, normal);
+    trace_normal_decode(view->normals + 4 * (size_t)pixel, normal);
     return true;
 }
 

@@ -9,7 +9,8 @@
 #define FAR_OUT 1e6f  /* px: from here on a corner's place is not exact enough */
 
 typedef cover_places places;
-typedef int32_t place_bits __attribute__((vector_size(4 * COVER_PLACES))); /* 0 or -1 each */
+typedef cover_bits place_bits;
+typedef int64_t place_pairs __attribute__((vector_size(4 * COVER_PLACES)));
 
 struct corner {
     float x, y, z; /* px, of the picture; depth. Not known yet: z is below 0; to be clipped: 2 */
@@ -27,10 +28,13 @@ struct plane {
 };
 
 struct triangle {
-    struct plane edges[3]; /* 0 along it, positive inside */
-    struct plane depth;
+    struct plane numbers[4]; /* three that are 0 along an edge, positive inside; depth */
+    places across, down;     /* the four numbers', per pixel */
+    places tile, pixel;      /* how much more than at its (first) centre they can be in it */
+    places offsets[4];       /* of a number at the places */
     float nearest, farthest;
     struct plane alpha[3]; /* cover_alpha_vertex() times depth */
+    places alpha_offsets[3];
 };
 
 struct drawing {
@@ -51,7 +55,19 @@ static places choose(place_bits which, places a, places b)
 
 static bool any(place_bits bits)
 {
-    return bits[0] | bits[1] | bits[2] | bits[3];
+    place_pairs pairs = (place_pairs)bits;
+    return pairs[0] | pairs[1];
+}
+
+/* fminf and fmaxf would be called. */
+static float lesser(float a, float b)
+{
+    return a < b ? a : b;
+}
+
+static float greater(float a, float b)
+{
+    return a > b ? a : b;
 }
 
 static double plane_at(const struct plane *p, double x, double y)
@@ -66,37 +82,67 @@ static struct plane line(const struct corner *a, const struct corner *b)
     return (struct plane){ax * by - bx * ay, ay - by, bx - ax};
 }
 
-static struct plane through(const struct plane edges[3], const double values[3], double area)
+/* weights: 1 at one corner each, 0 at the others. */
+static struct plane through(const struct plane weights[3], const double values[3])
 {
     struct plane p = {0};
-    for (int i = 0; i < 3; i++) { /* edge i is opposite to corner i */
-        p.at += edges[i].at * values[i] / area;
-        p.across += edges[i].across * values[i] / area;
-        p.down += edges[i].down * values[i] / area;
+    for (int i = 0; i < 3; i++) {
+        p.at += weights[i].at * values[i];
+        p.across += weights[i].across * values[i];
+        p.down += weights[i].down * values[i];
     }
     return p;
+}
+
+static struct plane scaled(const struct plane *p, double factor)
+{
+    return (struct plane){p->at * factor, p->across * factor, p->down * factor};
+}
+
+static places over_places(const struct cover *cover, const struct plane *p)
+{
+    return (float)p->across * cover->across + (float)p->down * cover->down;
+}
+
+static void step(const struct cover *cover, struct triangle *t)
+{
+    for (int i = 0; i < 4; i++) {
+        const struct plane *p = &t->numbers[i];
+        places offsets = t->offsets[i] = over_places(cover, p);
+        t->across[i] = (float)p->across;
+        t->down[i] = (float)p->down;
+        t->tile[i] = COVER_TILE * (float)(fabs(p->across) + fabs(p->down));
+        t->pixel[i] = greater(greater(offsets[0], offsets[1]), greater(offsets[2], offsets[3]));
+    }
+    t->tile[3] = t->pixel[3] = INFINITY; /* depth is not asked for its sign */
 }
 
 /* False: it faces away, or has no area. */
 static bool set_up(const struct drawing *d, const struct corner c[3], struct triangle *t)
 {
-    for (int i = 0; i < 3; i++)
-        t->edges[i] = line(&c[(i + 1) % 3], &c[(i + 2) % 3]);
-    double area = plane_at(&t->edges[0], (double)c[0].x, (double)c[0].y);
+    struct plane weights[3];
+    t->numbers[0] = line(&c[1], &c[2]); /* opposite to corner 0 */
+    double area = plane_at(&t->numbers[0], (double)c[0].x, (double)c[0].y);
     if (area == 0 || isnan(area) || (d->cull_back && (area > 0) != d->mirrored))
         return false;
-    double depths[3], values[3];
-    for (int i = 0; i < 3; i++)
+    t->numbers[1] = line(&c[2], &c[0]);
+    t->numbers[2] = line(&c[0], &c[1]);
+    double depths[3], values[3], inverse = 1 / area;
+    for (int i = 0; i < 3; i++) {
         depths[i] = (double)c[i].z;
-    t->depth = through(t->edges, depths, area);
-    t->farthest = fminf(c[0].z, fminf(c[1].z, c[2].z));
+        weights[i] = scaled(&t->numbers[i], inverse);
+    }
+    t->numbers[3] = through(weights, depths);
+    t->farthest = lesser(c[0].z, lesser(c[1].z, c[2].z));
     for (int k = 0; d->alpha && k < 3; k++) {
         for (int i = 0; i < 3; i++)
             values[i] = (double)c[i].at[k] * depths[i];
-        t->alpha[k] = through(t->edges, values, area);
+        t->alpha[k] = through(weights, values);
+        t->alpha_offsets[k] = over_places(d->cover, &t->alpha[k]);
     }
     for (int i = 0; i < 3 && area < 0; i++)
-        t->edges[i] = (struct plane){-t->edges[i].at, -t->edges[i].across, -t->edges[i].down};
+        t->numbers[i] = scaled(&t->numbers[i], -1);
+    step(d->cover, t);
     return true;
 }
 
@@ -104,39 +150,20 @@ static bool set_up(const struct drawing *d, const struct corner c[3], struct tri
 static place_bits cut(
     const struct drawing *d, const struct triangle *t, double x, double y, place_bits covered)
 {
-    const struct cover *cover = d->cover;
-    float level = 0;
-    bool known = false;
-    for (int i = 0; i < COVER_PLACES; i++) {
-        if (!covered[i])
-            continue;
-        double px = x + (double)cover->across[i], py = y + (double)cover->down[i];
-        double inverse = 1 / plane_at(&t->depth, px, py);
-        float at[3];
-        for (int k = 0; k < 3; k++)
-            at[k] = (float)(plane_at(&t->alpha[k], px, py) * inverse);
-        if (!known) {
-            float across[2], down[2];
-            for (int k = 0; k < 2; k++) {
-                double here = (double)at[k];
-                across[k] = (float)((t->alpha[k].across - here * t->depth.across) * inverse);
-                down[k] = (float)((t->alpha[k].down - here * t->depth.down) * inverse);
-            }
-            level = cover_alpha_level(d->alpha, across, down);
-            known = true;
-        }
-        if (cover_alpha_is_cut(d->alpha, at, level))
-            covered[i] = 0;
+    const struct plane *depth = &t->numbers[3];
+    double middle = plane_at(depth, x, y), numbers[3];
+    places at[3], inverse = 1 / (all((float)middle) + t->offsets[3]);
+    for (int k = 0; k < 3; k++) {
+        numbers[k] = plane_at(&t->alpha[k], x, y);
+        at[k] = (all((float)numbers[k]) + t->alpha_offsets[k]) * inverse;
     }
-    return covered;
-}
-
-static places over_places(const struct cover *cover, const struct plane *p)
-{
-    places result;
-    for (int i = 0; i < COVER_PLACES; i++)
-        result[i] = (float)p->across * cover->across[i] + (float)p->down * cover->down[i];
-    return result;
+    float across[2], down[2];
+    for (int k = 0; k < 2; k++) { /* at the centre, which may lie outside */
+        double here = numbers[k] / middle;
+        across[k] = (float)((t->alpha[k].across - here * depth->across) / middle);
+        down[k] = (float)((t->alpha[k].down - here * depth->down) / middle);
+    }
+    return cover_alpha_cut(d->alpha, at, cover_alpha_level(d->alpha, across, down), covered);
 }
 
 /* pixels: those of the tile, whose first one is at (x, y), that are wanted. */
@@ -144,35 +171,30 @@ static void draw_tile(
     const struct drawing *d, const struct triangle *t, uint32_t x, uint32_t y, uint32_t pixels)
 {
     const struct cover *cover = d->cover;
-    const struct plane *numbers[] = {&t->edges[0], &t->edges[1], &t->edges[2], &t->depth};
-    places offsets[4];
-    float at[4], across[4], down[4];
-    for (int i = 0; i < 4; i++) {
-        const struct plane *p = numbers[i];
-        float bend = COVER_TILE * (float)(fabs(p->across) + fabs(p->down));
-        offsets[i] = over_places(cover, p);
-        across[i] = (float)p->across, down[i] = (float)p->down;
-        at[i] = (float)plane_at(p, x + 0.5, y + 0.5);
-        if (i < 3 && at[i] + bend < 0)
-            return;
-    }
+    places first;
+    for (int i = 0; i < 4; i++)
+        first[i] = (float)plane_at(&t->numbers[i], x + 0.5, y + 0.5);
+    if (any(first + t->tile < 0.0f))
+        return;
     for (uint32_t left = pixels; left; left &= left - 1) {
         uint32_t bit = (uint32_t)__builtin_ctz(left);
-        float right = (float)(bit % COVER_TILE), below = (float)(bit / COVER_TILE);
-        places is[4];
-#pragma GCC unroll 4
-        for (int i = 0; i < 4; i++)
-            is[i] = offsets[i] + (at[i] + across[i] * right + down[i] * below);
-        place_bits covered = (is[0] >= 0.0f) & (is[1] >= 0.0f) & (is[2] >= 0.0f);
-        if (!any(covered))
+        places here = first + t->across * (float)(bit % COVER_TILE);
+        here += t->down * (float)(bit / COVER_TILE);
+        if (any(here + t->pixel < 0.0f))
             continue;
+        place_bits covered = (all(here[0]) + t->offsets[0] >= 0.0f) &
+                             (all(here[1]) + t->offsets[1] >= 0.0f) &
+                             (all(here[2]) + t->offsets[2] >= 0.0f);
         uint32_t px = x + bit % COVER_TILE, py = y + bit / COVER_TILE;
         places *depths = &cover->depths[(size_t)(py - cover->first) * cover->width + px];
         /* Slivers' planes are steep. */
-        places depth = choose(is[3] > t->nearest, all(t->nearest), is[3]);
+        places depth = all(here[3]) + t->offsets[3];
+        depth = choose(depth > t->nearest, all(t->nearest), depth);
         depth = choose(depth > t->farthest, depth, all(t->farthest));
         covered &= depth > *depths;
-        if (d->alpha && any(covered))
+        if (!any(covered))
+            continue;
+        if (d->alpha)
             covered = cut(d, t, px + 0.5, py + 0.5, covered);
         *depths = choose(covered, depth, *depths);
     }
@@ -191,15 +213,15 @@ static uint32_t bits_between(
 static void draw(const struct drawing *d, const struct corner c[3])
 {
     const struct cover *cover = d->cover;
-    float left = fmaxf(fminf(c[0].x, fminf(c[1].x, c[2].x)), 0);
-    float right = fminf(fmaxf(c[0].x, fmaxf(c[1].x, c[2].x)), (float)cover->width - 0.5f);
-    float top = fmaxf(fminf(c[0].y, fminf(c[1].y, c[2].y)), (float)cover->first);
-    float bottom =
-        fminf(fmaxf(c[0].y, fmaxf(c[1].y, c[2].y)), (float)(cover->first + cover->rows) - 0.5f);
+    float left = greater(lesser(c[0].x, lesser(c[1].x, c[2].x)), 0);
+    float right = lesser(greater(c[0].x, greater(c[1].x, c[2].x)), (float)cover->width - 0.5f);
+    float top = greater(lesser(c[0].y, lesser(c[1].y, c[2].y)), (float)cover->first);
+    float bottom = lesser(
+        greater(c[0].y, greater(c[1].y, c[2].y)), (float)(cover->first + cover->rows) - 0.5f);
     if (!(left <= right && top <= bottom))
         return;
     struct triangle t;
-    t.nearest = fmaxf(c[0].z, fmaxf(c[1].z, c[2].z));
+    t.nearest = greater(c[0].z, greater(c[1].z, c[2].z));
     uint32_t x0 = (uint32_t)left, x1 = (uint32_t)right, y0 = (uint32_t)top, y1 = (uint32_t)bottom;
     size_t across = (cover->width + COVER_TILE - 1) / COVER_TILE;
     bool ready = false;
@@ -221,8 +243,9 @@ static void draw(const struct drawing *d, const struct corner c[3])
 
 static struct corner on_screen(const struct cover *cover, const struct clip_corner *clip)
 {
-    struct corner c = {(0.5f + 0.5f * clip->c[0] / clip->c[3]) * (float)cover->width,
-        (0.5f - 0.5f * clip->c[1] / clip->c[3]) * (float)cover->height, clip->c[2] / clip->c[3],
+    float inverse = 1 / clip->c[3];
+    struct corner c = {(0.5f + 0.5f * clip->c[0] * inverse) * (float)cover->width,
+        (0.5f - 0.5f * clip->c[1] * inverse) * (float)cover->height, clip->c[2] * inverse,
         {clip->at[0], clip->at[1], clip->at[2]}};
     return c;
 }

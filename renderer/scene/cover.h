@@ -1,10 +1,10 @@
 /* Depths at several places of some pixels, drawn by the CPU. Software rasterisers take longer for
  * each triangle, and for all the pixels of which nobody asks. */
 #pragma once
+#include "renderer/scene/cover_alpha.h"
 #include "renderer/scene/scene.h"
 
-enum { COVER_PLACES = 4, COVER_TILE = 4 };
-typedef float cover_places __attribute__((vector_size(4 * COVER_PLACES)));
+enum { COVER_TILE = 4 };
 
 /* COVER_TILE x COVER_TILE pixels. */
 struct cover_tile {
@@ -14,11 +14,11 @@ struct cover_tile {
 
 struct cover {
     mat4 world_to_clip;
-    uint32_t width, height;                         /* of the picture */
-    uint32_t first, rows;                           /* that are drawn */
-    const struct cover_tile *tiles;                 /* of the whole picture */
-    float across[COVER_PLACES], down[COVER_PLACES]; /* of the places, from a pixel's centre, px */
-    cover_places *depths; /* width x rows; 0 to begin with; what is not wanted may stay */
+    uint32_t width, height;         /* of the picture */
+    uint32_t first, rows;           /* that are drawn */
+    const struct cover_tile *tiles; /* of the whole picture */
+    cover_places across, down;      /* of the places, from a pixel's centre, px */
+    cover_places *depths;           /* width x rows; 0 to begin with; what is not wanted may stay */
 };
 
 struct cover_scene {

@@ -9,8 +9,16 @@ void cover_alpha_begin(
     if (m->base.texture < 0)
         return;
     alpha->texture = &scene->textures[m->base.texture];
-    alpha->image = &scene->images[alpha->texture->image];
-    alpha->texels = scene->texels + alpha->image->first_byte;
+    const struct psc_image *image = &scene->images[alpha->texture->image];
+    const uint8_t *texels = scene->texels + image->first_byte;
+    int32_t w = (int32_t)image->width, h = (int32_t)image->height;
+    alpha->last = image->levels - 1;
+    for (uint32_t i = 0; i < image->levels; i++) {
+        alpha->levels[i] = (struct cover_level){texels, w, h};
+        texels += (size_t)4 * (uint32_t)w * (uint32_t)h;
+        w = w > 1 ? w / 2 : 1;
+        h = h > 1 ? h / 2 : 1;
+    }
 }
 
 void cover_alpha_vertex(
@@ -27,7 +35,7 @@ float cover_alpha_level(const struct cover_alpha *alpha, const float across[2], 
 {
     if (!alpha->texture)
         return 0;
-    const float size[2] = {(float)alpha->image->width, (float)alpha->image->height};
+    const float size[2] = {(float)alpha->levels[0].width, (float)alpha->levels[0].height};
     float x[2], y[2];
     for (int i = 0; i < 2; i++)
         x[i] = across[i] * size[i], y[i] = down[i] * size[i];
@@ -35,59 +43,88 @@ float cover_alpha_level(const struct cover_alpha *alpha, const float across[2], 
     return texels > 0 ? 0.5f * log2f(texels) : 0;
 }
 
-/* Texel number of texel `i` of `size`. */
-static int32_t wrap(int32_t i, int32_t size, uint32_t mode)
+static cover_places all(float value)
 {
-    if (i >= 0 && i < size)
-        return i;
-    if (mode == PSC_CLAMP)
-        return i < 0 ? 0 : size - 1;
-    int32_t period = mode == PSC_MIRROR ? 2 * size : size;
-    i %= period;
-    i += i < 0 ? period : 0;
-    return i < size ? i : period - 1 - i;
+    return (cover_places){value, value, value, value};
 }
 
-/* Brought near the image, so that it fits an integer; 0 for what is no number. */
-static float reduce(float t, uint32_t mode)
+static cover_bits choose(cover_bits which, cover_bits a, cover_bits b)
+{
+    return (which & a) | (~which & b);
+}
+
+static cover_bits clamp(cover_bits i, int32_t most)
+{
+    i &= i > 0;
+    return choose(i > most, most + (cover_bits){0}, i);
+}
+
+/* Texel number of texels that are at most a period of `size` away. */
+static cover_bits wrap(cover_bits i, int32_t size, uint32_t mode)
+{
+    if (mode == PSC_CLAMP)
+        return clamp(i, size - 1);
+    if (mode == PSC_REPEAT)
+        return i + ((i < 0) & size) - ((i >= size) & size);
+    i -= (i >= 2 * size) & (2 * size);
+    i = choose(i < 0, -1 - i, i);
+    return choose(i >= size, 2 * size - 1 - i, i);
+}
+
+static cover_places whole(cover_places t)
+{
+    cover_places towards_0 =
+        __builtin_convertvector(__builtin_convertvector(t, cover_bits), cover_places);
+    return towards_0 + __builtin_convertvector(t < towards_0, cover_places);
+}
+
+/* Brought near the image, so that it fits an integer; 0 for what is no number or has no fraction. */
+static cover_places reduce(cover_places t, uint32_t mode)
 {
     float period = mode == PSC_MIRROR ? 2 : 1;
-    if (mode != PSC_CLAMP)
-        t -= period * floorf(t / period);
-    return t > -1 ? fminf(t, 2) : t <= -1 ? -1 : 0;
-}
-
-static float sample(
-    const struct cover_alpha *alpha, const float at[2], uint32_t level, bool nearest)
-{
-    const struct psc_image *image = alpha->image;
-    const uint8_t *texels = alpha->texels;
-    int32_t w = (int32_t)image->width, h = (int32_t)image->height;
-    for (; level; level--) {
-        texels += (size_t)4 * (uint32_t)w * (uint32_t)h;
-        w = w > 1 ? w / 2 : 1;
-        h = h > 1 ? h / 2 : 1;
+    if (mode != PSC_CLAMP) {
+        t = (cover_places)((cover_bits)t & (t > -0x1p23f) & (t < 0x1p23f));
+        return t - period * whole(t / period);
     }
-    uint32_t modes[] = {alpha->texture->wrap_s, alpha->texture->wrap_t};
-    float shift = nearest ? 0 : 0.5f;
-    float s = reduce(at[0], modes[0]) * (float)w - shift;
-    float t = reduce(at[1], modes[1]) * (float)h - shift;
-    float left = floorf(s), top = floorf(t);
-    int32_t x = wrap((int32_t)left, w, modes[0]), y = wrap((int32_t)top, h, modes[1]);
-    const uint8_t *row = texels + (size_t)4 * (uint32_t)(y * w) + 3;
-    if (nearest)
-        return (float)row[4 * x] / 255;
-    int32_t right = wrap((int32_t)left + 1, w, modes[0]);
-    const uint8_t *next =
-        texels + (size_t)4 * (uint32_t)(wrap((int32_t)top + 1, h, modes[1]) * w) + 3;
-    float a = (float)row[4 * x] + (s - left) * (float)(row[4 * right] - row[4 * x]);
-    float b = (float)next[4 * x] + (s - left) * (float)(next[4 * right] - next[4 * x]);
-    return (a + (t - top) * (b - a)) / 255;
+    t = (cover_places)choose(t > -1.0f, (cover_bits)t, (cover_bits)all(-1) & (t <= -1.0f));
+    return (cover_places)choose(t > 2.0f, (cover_bits)all(2), (cover_bits)t);
 }
 
-static float sample_levels(const struct cover_alpha *alpha, const float at[2], float level)
+static cover_places fetch(const struct cover_level *level, cover_bits x, cover_bits y)
 {
-    uint32_t filter = alpha->texture->nearest, last = alpha->image->levels - 1;
+    const uint8_t *at[COVER_PLACES];
+    for (int i = 0; i < COVER_PLACES; i++)
+        at[i] = level->texels + 4 * ((size_t)y[i] * (size_t)level->width + (size_t)x[i]) + 3;
+    return __builtin_convertvector(((cover_bits){*at[0], *at[1], *at[2], *at[3]}), cover_places);
+}
+
+static cover_places sample(
+    const struct cover_alpha *alpha, const cover_places at[2], uint32_t number, bool nearest)
+{
+    const struct cover_level *level = &alpha->levels[number];
+    int32_t w = level->width, h = level->height;
+    uint32_t across = alpha->texture->wrap_s, down = alpha->texture->wrap_t;
+    float shift = nearest ? 0 : 0.5f;
+    cover_places s = reduce(at[0], across) * (float)w - shift;
+    cover_places t = reduce(at[1], down) * (float)h - shift;
+    cover_places left = whole(s), top = whole(t);
+    cover_bits column = __builtin_convertvector(left, cover_bits);
+    cover_bits row = __builtin_convertvector(top, cover_bits);
+    cover_bits x = wrap(column, w, across), y = wrap(row, h, down);
+    cover_places first = fetch(level, x, y);
+    if (nearest)
+        return first / 255.0f;
+    cover_bits right = wrap(column + 1, w, across), below = wrap(row + 1, h, down);
+    cover_places third = fetch(level, x, below);
+    cover_places a = first + (s - left) * (fetch(level, right, y) - first);
+    cover_places b = third + (s - left) * (fetch(level, right, below) - third);
+    return (a + (t - top) * (b - a)) / 255.0f;
+}
+
+static cover_places sample_levels(
+    const struct cover_alpha *alpha, const cover_places at[2], float level)
+{
+    uint32_t filter = alpha->texture->nearest, last = alpha->last;
     if (!(level > 0))
         return sample(alpha, at, 0, filter & 1);
     bool nearest = filter & 2;
@@ -97,14 +134,18 @@ static float sample_levels(const struct cover_alpha *alpha, const float at[2], f
     if (filter & 4)
         return sample(alpha, at, (uint32_t)(level + 0.5f), nearest);
     uint32_t finer = (uint32_t)level < last ? (uint32_t)level : last - 1;
-    float a = sample(alpha, at, finer, nearest), b = sample(alpha, at, finer + 1, nearest);
+    cover_places a = sample(alpha, at, finer, nearest);
+    cover_places b = sample(alpha, at, finer + 1, nearest);
     return a + (level - (float)finer) * (b - a);
 }
 
-bool cover_alpha_is_cut(const struct cover_alpha *alpha, const float at[3], float level)
+cover_bits cover_alpha_cut(
+    const struct cover_alpha *alpha, const cover_places at[3], float level, cover_bits which)
 {
-    float a = alpha->texture ? at[2] * sample_levels(alpha, at, level) : at[2];
+    cover_places a = at[2];
+    if (alpha->texture)
+        a *= sample_levels(alpha, at, level);
     if (alpha->material->alpha_mode == PSC_MASK)
-        return a < alpha->material->alpha_cutoff;
-    return alpha->material->alpha_mode == PSC_BLEND && !(a > alpha->threshold);
+        return which & ~(a < alpha->material->alpha_cutoff);
+    return alpha->material->alpha_mode == PSC_BLEND ? which & (a > alpha->threshold) : which;
 }

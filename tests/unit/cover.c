@@ -60,6 +60,19 @@ static void make_triangles(void)
         texels[4 * i + 3] = uniform(&state, 0, 1) < 0.5 ? 0 : 255;
 }
 
+static struct psc_texture texture = {0, PSC_REPEAT, PSC_REPEAT, 15};
+
+/* doubt: it may be its neighbour. */
+static uint32_t texel_at(double coordinate, uint32_t mode, bool *doubt)
+{
+    double at = TEXELS * coordinate, i = floor(at);
+    *doubt |= fabs(at - round(at)) < 0.02;
+    if (mode == PSC_CLAMP)
+        return (uint32_t)fmin(fmax(i, 0), TEXELS - 1);
+    uint32_t within = (uint32_t)(i - 2 * TEXELS * floor(i / (2 * TEXELS)));
+    return within < TEXELS || mode == PSC_REPEAT ? within % TEXELS : 2 * TEXELS - 1 - within;
+}
+
 /* What a place shows of one triangle: its depth, or 0. doubt: something near decides. */
 static double depth_at(
     const struct cull_view *view, uint32_t triangle, double x, double y, bool *doubt)
@@ -100,13 +113,9 @@ static double depth_at(
         return 0;
     *doubt = least < 1e-3 || through < 1.001 * near_z;
     if (has_holes(triangle)) {
-        uint32_t texel[2];
-        for (int k = 0; k < 2; k++) {
-            double at = TEXELS * (uv[k] - floor(uv[k]));
-            *doubt |= fabs(at - round(at)) < 0.02;
-            texel[k] = (uint32_t)at % TEXELS;
-        }
-        if (!*doubt && !texels[4 * (texel[1] * TEXELS + texel[0]) + 3])
+        uint32_t column = texel_at(uv[0], texture.wrap_s, doubt);
+        uint32_t row = texel_at(uv[1], texture.wrap_t, doubt);
+        if (!*doubt && !texels[4 * (row * TEXELS + column) + 3])
             return 0;
     }
     return near_z / through;
@@ -147,7 +156,6 @@ int main(void)
     struct psc_instance instances[] = {
         {{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}, 0, 0}, {{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}, 1, 0}};
     struct psc_image image = {TEXELS, TEXELS, 1, 0, 0};
-    struct psc_texture texture = {0, PSC_REPEAT, PSC_REPEAT, 15};
     struct psc_material materials[2] = {
         {.base = {.texture = -1}}, {.base_color = {1, 1, 1, 1},
                                        .alpha_mode = PSC_MASK,
@@ -186,6 +194,7 @@ int main(void)
     for (int round = 0; round < ROUNDS; round++) {
         struct cull_view view = {0};
         make_view(&view);
+        texture.wrap_s = (uint32_t)round % 3, texture.wrap_t = (uint32_t)round / 3 % 3;
         make_triangles();
         areas[0] = areas[1] = -1;
         for (int i = 0; i < DOWN * ACROSS; i++)

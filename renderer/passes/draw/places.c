@@ -79,8 +79,8 @@ static bool cover_rows(struct technique_ctx *ctx, struct scene *scene, const str
     struct pass_bands bands;
     bool more = true, ok = true;
     memcpy(cover.world_to_clip, view->world_to_clip, sizeof cover.world_to_clip);
-    memcpy(cover.across, places_across, sizeof places_across);
-    memcpy(cover.down, places_down, sizeof places_down);
+    memcpy(&cover.across, places_across, sizeof places_across);
+    memcpy(&cover.down, places_down, sizeof places_down);
     pass_bands_begin(ctx, &bands, view->width, which->rows, view->width * which->rows, COVER_KIND);
     bands.by_hand = true;
     while (ok && more) {

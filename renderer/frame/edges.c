@@ -1,18 +1,20 @@
 #include "renderer/frame/edges.h"
 #include "protocol/memory.h"
 #include "renderer/frame/needs.h"
+#include "renderer/edges/edge_light.h"
 #include "renderer/passes/draw/passes.h"
 #include "renderer/passes/draw/places.h"
 #include "renderer/passes/draw/screen.h"
 #include "renderer/passes/draw/tiles.h"
 #include "renderer/passes/draw/turn.h"
-#include "renderer/scene/cover.h"
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 _Static_assert(OPEN_TILE == 4 && COVER_TILE == 4, "edge_tiles.frag looks at so many");
 
-#define BAND_PIXELS (4u << 20) /* whose places are in memory together: 64 MiB */
+#define BAND_PIXELS (4u << 20) /* whose places are in memory together: 64 MiB at most */
 
 bool frame_edges_are_smooth(const struct frame_job *job)
 {
@@ -20,8 +22,12 @@ bool frame_edges_are_smooth(const struct frame_job *job)
     return r->edges == PEN_EDGES_SMOOTH && r->antialias == 1 && frame_needs(r, PEN_SOURCE_BEAUTY);
 }
 
-/* What shows no edge stays as it is. Software rasterisers run all of a shader for every pixel, so
- * only tiles with edges are drawn. */
+bool frame_edges_are_drawn(const struct frame_job *job)
+{
+    return frame_edges_are_smooth(job) && !job->ctx->software;
+}
+
+/* What shows no edge stays as it is. */
 static bool find_tiles(
     const struct frame_job *job, const struct gl_texture **tiles, struct pen_error *error)
 {
@@ -46,21 +52,6 @@ static bool find_tiles(
             .width = width,
             .height = height},
         error);
-}
-
-/* Of which pixels places have to be known, and before what. The caller frees it. */
-static struct cover_tile *read_tiles(const struct frame_job *job, const struct gl_texture *tiles)
-{
-    size_t n = (size_t)tiles->width * tiles->height;
-    float(*found)[4] = pen_alloc(n, sizeof *found);
-    struct cover_tile *wanted = pen_alloc(n, sizeof *wanted);
-    gl_timer_begin(&job->ctx->timer, PEN_STAGE_SHADE, "edge tiles");
-    gl.GetTextureImage(tiles->name, 0, GL_RGBA, GL_FLOAT, (GLsizei)(n * sizeof *found), found);
-    for (size_t i = 0; i < n; i++)
-        wanted[i] = (struct cover_tile){found[i][1], (uint32_t)(found[i][2] + 0.5f)};
-    gl_timer_end(&job->ctx->timer);
-    free(found);
-    return wanted;
 }
 
 static bool blend(const struct frame_job *job, const struct gl_texture *picture,
@@ -115,9 +106,8 @@ bool frame_edges_blend(const struct frame_job *job, const struct view *view, boo
     struct frame_targets *t = job->targets;
     const struct pen_request *r = job->request;
     bool layered = frame_is_layered(job);
-    char defines[96];
-    snprintf(defines, sizeof defines, "%s%s%s", layered ? "#define LAYERED\n" : "",
-        job->ctx->software ? "#define GATHERED\n" : "",
+    char defines[64];
+    snprintf(defines, sizeof defines, "%s%s", layered ? "#define LAYERED\n" : "",
         resolved ? "#define RESOLVED\n"
         : raw    ? "#define RAW\n"
                  : "");
@@ -126,13 +116,10 @@ bool frame_edges_blend(const struct frame_job *job, const struct view *view, boo
     if (!fill(job, resolved, raw, error) || !find_tiles(job, &tiles, error))
         return false;
     bool ok = true;
-    /* Elsewhere than in software it costs less to draw all than to wait for what was drawn. */
-    struct cover_tile *wanted = job->ctx->software ? read_tiles(job, tiles) : NULL;
     for (uint32_t first = 0; ok && first < r->height; first += most) {
         uint32_t rows = r->height - first < most ? r->height - first : most;
-        struct places_pass solid = {
-            layered ? PLACES_SOLID : PLACES_ALL, r->ground.on, first, rows, wanted};
-        struct places_pass front = {PLACES_BLENDED, false, first, rows, wanted};
+        struct places_pass solid = {layered ? PLACES_SOLID : PLACES_ALL, r->ground.on, first, rows};
+        struct places_pass front = {PLACES_BLENDED, false, first, rows};
         struct edges_block block;
         ok = pass_places(job->ctx, job->scene, view, &solid, &t->places, &block, error) &&
              (!layered || pass_places(job->ctx, job->scene, view, &front, &t->front_places, &block,
@@ -140,6 +127,160 @@ bool frame_edges_blend(const struct frame_job *job, const struct view *view, boo
              blend(job, resolved ? &t->stairs.texture : &t->beauty.texture, defines, &block, tiles,
                  error);
     }
-    free(wanted);
+    return ok;
+}
+
+/* What the CPU knows of some rows. */
+struct band {
+    const struct frame_job *job;
+    struct edge_rows rows;
+    struct cover_tile *tiles; /* of the whole picture */
+    cover_places *places[2];
+    uint8_t *before, *last; /* the row above the next band */
+};
+
+static void read_depths(const struct band *b, const struct gl_texture *texture, float *depths)
+{
+    const struct edge_rows *e = &b->rows;
+    uint32_t from = e->first ? e->first - 1 : 0, end = e->first + e->rows, width = texture->width;
+    uint32_t stride = edge_stride(width);
+    end += end < texture->height;
+    gl.PixelStorei(GL_PACK_ROW_LENGTH, (GLint)stride);
+    gl.GetTextureSubImage(texture->name, 0, 0, (GLint)from, 0, (GLsizei)width,
+        (GLsizei)(end - from), 1, GL_DEPTH_COMPONENT, GL_FLOAT,
+        (GLsizei)(stride * (end - from) * sizeof *depths),
+        depths + (size_t)(from + 1 - e->first) * stride + EDGE_MARGIN);
+    gl.PixelStorei(GL_PACK_ROW_LENGTH, 0);
+    edge_pad(e, depths);
+}
+
+static void read_normals(
+    const struct band *b, const struct gl_texture *texture, uint16_t (*normals)[4])
+{
+    const struct edge_rows *e = &b->rows;
+    uint32_t from = e->first ? e->first - 1 : 0, end = e->first + e->rows, width = texture->width;
+    end += end < texture->height;
+    gl.GetTextureSubImage(texture->name, 0, 0, (GLint)from, 0, (GLsizei)width,
+        (GLsizei)(end - from), 1, GL_RGBA, GL_UNSIGNED_SHORT,
+        (GLsizei)(width * (end - from) * sizeof *normals),
+        normals + (size_t)(from + 1 - e->first) * width);
+}
+
+/* What was drawn, and the picture before edges are made smooth in it. */
+static void read_rows(struct band *b)
+{
+    struct edge_rows *e = &b->rows;
+    const struct frame_targets *t = b->job->targets;
+    uint32_t end = e->first + e->rows;
+    size_t row = (size_t)e->view->width * edge_pixel_bytes(e->plane);
+    read_depths(b, &t->gbuffer.depth.texture, e->solid.depths);
+    read_normals(b, &t->gbuffer.normal.texture, e->solid.normals);
+    if (e->layered) {
+        read_depths(b, &t->front_depth.texture, e->front.depths);
+        read_normals(b, &t->front_normal.texture, e->front.normals);
+        size_t count = (size_t)edge_stride(e->view->width) * (e->rows + 2 + OPEN_TILE);
+        for (size_t i = 0; i < count; i++)
+            e->nearest[i] = fmaxf(e->solid.depths[i], e->front.depths[i]);
+    }
+    memcpy(b->before, b->last, row);
+    memcpy(b->before + row, (const uint8_t *)e->plane->data + e->first * row,
+        (e->rows + (end < e->view->height)) * row);
+    memcpy(b->last, b->before + e->rows * row, row);
+}
+
+static void take_memory(struct band *b, uint32_t rows)
+{
+    struct edge_rows *e = &b->rows;
+    uint32_t width = e->view->width;
+    size_t depths = (size_t)edge_stride(width) * (rows + 2 + OPEN_TILE);
+    size_t pixels = (size_t)width * (rows + 2);
+    struct edge_surface *surfaces[] = {&e->solid, &e->front};
+    for (int i = 0; i < 1 + e->layered; i++) {
+        surfaces[i]->depths = pen_alloc(depths, sizeof *e->nearest);
+        surfaces[i]->normals = pen_alloc(pixels, sizeof *e->solid.normals);
+    }
+    e->nearest = e->layered ? pen_alloc(depths, sizeof *e->nearest) : NULL;
+    b->tiles = pen_alloc((size_t)((width + OPEN_TILE - 1) / OPEN_TILE) *
+                             ((e->view->height + OPEN_TILE - 1) / OPEN_TILE),
+        sizeof *b->tiles);
+    e->before = b->before = pen_alloc(pixels, edge_pixel_bytes(e->plane));
+    b->last = pen_alloc_zero(width, edge_pixel_bytes(e->plane));
+}
+
+static void free_memory(struct band *b)
+{
+    struct edge_rows *e = &b->rows;
+    free(e->solid.depths);
+    free(e->solid.normals);
+    free(e->front.depths);
+    free(e->front.normals);
+    free(e->nearest);
+    free(b->tiles);
+    free(b->before);
+    free(b->last);
+}
+
+static bool cover_band(struct band *b, uint32_t slots, struct pen_error *error)
+{
+    const struct frame_job *job = b->job;
+    struct edge_rows *e = &b->rows;
+    size_t places = (size_t)slots * COVER_PIXELS;
+    struct places_pass solid = {e->layered ? PLACES_SOLID : PLACES_ALL, job->request->ground.on,
+                           e->first, e->rows},
+                       front = {PLACES_BLENDED, false, e->first, e->rows};
+    e->solid.places = b->places[0] = pen_alloc_zero(places, sizeof **b->places);
+    e->front.places = b->places[1] = e->layered ? pen_alloc_zero(places, sizeof **b->places) : NULL;
+    return pass_cover(job->ctx, job->scene, e->view, &solid, b->tiles, b->places[0], error) &&
+           (!e->layered ||
+               pass_cover(job->ctx, job->scene, e->view, &front, b->tiles, b->places[1], error));
+}
+
+static bool blend_band(struct band *b, struct pen_error *error)
+{
+    struct technique_ctx *ctx = b->job->ctx;
+    const struct edge_rows *e = &b->rows;
+    bool ok = true;
+    gl_timer_begin(&ctx->timer, PEN_STAGE_SHADE, "edges");
+    for (uint32_t y = e->first; ok && y < e->first + e->rows; y += OPEN_TILE) {
+        edge_blend(e, b->tiles, y);
+        ok = pass_turn_inside(ctx, error);
+    }
+    gl_timer_end(&ctx->timer);
+    return ok;
+}
+
+static bool smooth_band(struct band *b, struct pen_error *error)
+{
+    struct gl_timer *timer = &b->job->ctx->timer;
+    gl_timer_begin(timer, PEN_STAGE_SHADE, "edge tiles");
+    read_rows(b);
+    uint32_t slots = edge_find(&b->rows, b->tiles);
+    gl_timer_end(timer);
+    bool ok = pass_turn(b->job->ctx, error) &&
+              (!slots || (cover_band(b, slots, error) && blend_band(b, error)));
+    for (int i = 0; i < 2; i++) {
+        free(b->places[i]);
+        b->places[i] = NULL;
+    }
+    return ok;
+}
+
+bool frame_edges_smooth(const struct frame_job *job, const struct view *view, bool raw,
+    struct pen_plane *plane, struct pen_error *error)
+{
+    uint32_t height = view->height, most = BAND_PIXELS / view->width / OPEN_TILE * OPEN_TILE;
+    struct band b = {.job = job,
+        .rows = {.view = view,
+            .focal = 0.5f * (float)height / tanf(0.5f * view->fov_y_rad),
+            .layered = frame_is_layered(job),
+            .raw = raw,
+            .plane = plane}};
+    bool ok = true;
+    take_memory(&b, most < height ? most : height);
+    for (; ok && b.rows.first < height; b.rows.first += most) {
+        b.rows.rows = height - b.rows.first < most ? height - b.rows.first : most;
+        ok = smooth_band(&b, error);
+    }
+    free_memory(&b);
     return ok;
 }

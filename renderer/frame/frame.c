@@ -57,7 +57,7 @@ static bool fit_targets(struct frame *f, struct pen_error *error)
     gl_target_fit(&t->vis, GL_RGBA16F, r->width, r->height, f->light_count ? f->light_count : 1, 1);
     if (frame_is_layered(f->job))
         frame_blended_fit(f->job);
-    if (frame_output_is_direct(f->job) && frame_edges_are_smooth(f->job))
+    if (frame_output_is_direct(f->job) && frame_edges_are_drawn(f->job))
         gl_target_fit(&t->stairs, GL_RGBA8, r->width, r->height, 0, 1);
     if (!frame_output_is_direct(f->job) && frame_needs(r, PEN_SOURCE_BEAUTY))
         frame_fit_sum(&t->beauty, GL_RGBA32F, r);
@@ -349,10 +349,10 @@ static bool shade(struct frame *f, struct pen_error *error)
     const struct gbuffer *g = f->gbuffer;
     bool direct = frame_output_is_direct(job), layered = frame_is_layered(job),
          emission = g->emission.texture.name != 0;
-    const struct gl_target *target = layered                       ? &t->layers
-                                     : !direct                     ? &t->beauty
-                                     : frame_edges_are_smooth(job) ? &t->stairs
-                                                                   : &t->color;
+    const struct gl_target *target = layered                      ? &t->layers
+                                     : !direct                    ? &t->beauty
+                                     : frame_edges_are_drawn(job) ? &t->stairs
+                                                                  : &t->color;
     struct shade_block block;
     make_shade_block(f, &block);
     struct pass_texture textures[] = {{UNIT_DEPTH, g->depth.texture.name, GL_SAMPLE_NEAREST},

@@ -149,6 +149,17 @@ static void read_plane(
     gl_timer_end(&job->ctx->timer);
 }
 
+/* To whole codes, as OpenGL rounds them. */
+static void narrow(struct pen_plane *plane, size_t pixels)
+{
+    float *from = plane->data;
+    uint8_t *to = plane->data;
+    for (size_t i = 0; i < 4 * pixels; i++)
+        to[i] = (uint8_t)(255 * fmaxf(fminf(from[i], 1), 0) + 0.5f);
+    plane->data = pen_realloc_array(plane->data, pixels, 4);
+    plane->pixel = PEN_PIXEL_RGBA8;
+}
+
 bool frame_output_read(const struct frame_job *job, const struct view *view, uint32_t frames,
     struct pen_frame *frame, struct pen_error *error)
 {
@@ -166,17 +177,30 @@ bool frame_output_read(const struct frame_job *job, const struct view *view, uin
         enum pen_pixel pixel = pixel_of(&r->output, layer);
         bool direct = frame_output_is_direct(job);
         bool smooth = pen_layers[layer].source == PEN_SOURCE_BEAUTY && frame_edges_are_smooth(job);
+        bool drawn = smooth && frame_edges_are_drawn(job);
+        /* Alpha is rounded once. */
+        bool narrowed = smooth && !drawn && !direct && pixel == PEN_PIXEL_RGBA8;
+        if (narrowed)
+            pixel = PEN_PIXEL_RGBA32F;
         if (!direct)
             fit_color(job->targets, r, pixel);
-        if (smooth    ? !frame_edges_blend(job, view, direct, raw, error)
+        if (drawn     ? !frame_edges_blend(job, view, direct, raw, error)
             : !direct ? !convert(job, &block, layer, raw, error)
-                      : false) {
-            pen_frame_finish(frame);
-            return false;
-        }
+                      : false)
+            goto fail;
         read_plane(job, pixel, layer, frame);
+        struct pen_plane *plane = &frame->planes[frame->plane_count - 1];
+        if (smooth && !drawn && !frame_edges_smooth(job, view, raw, plane, error))
+            goto fail;
+        if (narrowed) {
+            narrow(plane, (size_t)r->width * r->height);
+            plane->channels = channels_of(r, layer, PEN_PIXEL_RGBA8);
+        }
     }
     return true;
+fail:
+    pen_frame_finish(frame);
+    return false;
 }
 
 /* Bytes per pixel: the G-buffer without emission; what blended layers have besides; what most methods

@@ -66,7 +66,7 @@ FLOORS = {
         ["import/geometry"],
         ["import/convert"], ["import/motion"], ["import/convert/node"], ["import/convert/convert"],
         ["import"],
-        ["scene"], ["light"],
+        ["scene"], ["light", "edges"],
         ["technique"],
         ["passes/draw"], ["passes/map", "passes/rays"], ["passes/light"], ["passes/filter"],
         ["techniques"],

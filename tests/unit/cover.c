@@ -1,7 +1,7 @@
 /* Depths that the CPU draws at places of some pixels, against homogeneous coordinates of those
  * places in double precision (Olano and Greer 1997): triangles of any size, cut by the near plane
  * or not, turned away or not, half of them with holes that a texture cuts. */
-#include "renderer/scene/cover.h"
+#include "renderer/edges/cover.h"
 #include "tests/unit/check.h"
 #include "tests/unit/random.h"
 #include <cglm/cglm.h>
@@ -127,14 +127,16 @@ static void check_pixel(
     const struct cull_view *view, const struct cover *cover, uint32_t x, uint32_t y)
 {
     const struct cover_tile *tile = &cover->tiles[y / COVER_TILE * ACROSS + x / COVER_TILE];
-    if (!(tile->pixels >> (y % COVER_TILE * COVER_TILE + x % COVER_TILE) & 1))
+    uint32_t bit = y % COVER_TILE * COVER_TILE + x % COVER_TILE;
+    if (!(tile->pixels >> bit & 1))
         return;
     for (uint32_t i = 0; i < COVER_PLACES; i++) {
-        double least = 0, most = 0, found = (double)cover->depths[(y - FIRST) * WIDTH + x][i];
+        double least = 0, most = 0,
+               found = (double)cover->depths[tile->slot * COVER_PIXELS + bit][i];
         for (uint32_t t = 0; t < TRIANGLES; t++) {
             bool doubt = false;
-            double depth = depth_at(view, t, x + 0.5 + (double)cover->across[i],
-                y + 0.5 + (double)cover->down[i], &doubt);
+            double depth = depth_at(view, t, x + 0.5 + (double)cover_across[i],
+                y + 0.5 + (double)cover_down[i], &doubt);
             most = fmax(most, depth);
             least = doubt ? least : fmax(least, depth);
         }
@@ -148,7 +150,7 @@ static void check_pixel(
 int main(void)
 {
     static struct cover_tile tiles[DOWN * ACROSS];
-    static cover_places depths[WIDTH * ROWS];
+    static cover_places depths[DOWN * ACROSS * COVER_PIXELS];
     struct psc_meshlet meshlets[] = {
         {0, CORNERS / 2, {0}, 100, {0}, 2}, {CORNERS / 2, CORNERS / 2, {0}, 100, {0}, 2}};
     struct psc_primitive primitives[] = {{0, CORNERS / 2, 0, CORNERS, 0, 1, 0, 0},
@@ -188,8 +190,6 @@ int main(void)
         .first = FIRST,
         .rows = ROWS,
         .tiles = tiles,
-        .across = {-0.125f, 0.375f, -0.375f, 0.125f},
-        .down = {-0.375f, -0.125f, 0.125f, 0.375f},
         .depths = depths};
     for (int round = 0; round < ROUNDS; round++) {
         struct cull_view view = {0};
@@ -199,7 +199,7 @@ int main(void)
         areas[0] = areas[1] = -1;
         for (int i = 0; i < DOWN * ACROSS; i++)
             tiles[i] = (struct cover_tile){i % 3 ? 0 : (float)(near_z / uniform(&state, 1, 9)),
-                i % 4 ? 0 : (uint32_t)uniform(&state, 0, 65536)};
+                i % 4 ? 0 : (uint32_t)uniform(&state, 0, 65536), (uint32_t)i};
         memset(depths, 0, sizeof depths);
         memcpy(cover.world_to_clip, view.world_to_clip, sizeof view.world_to_clip);
         struct cull_piece piece = {

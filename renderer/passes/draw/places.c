@@ -1,8 +1,5 @@
 #include "renderer/passes/draw/places.h"
-#include "protocol/memory.h"
 #include "renderer/passes/draw/turn.h"
-#include "renderer/scene/cover.h"
-#include <stdlib.h>
 #include <string.h>
 
 #define COVER_KIND UINT64_MAX
@@ -55,10 +52,6 @@ static void draw_piece(struct technique_ctx *ctx, struct scene *scene, const str
     gl.Disable(GL_DEPTH_TEST);
 }
 
-/* As standard multisampling has them. */
-static const float places_across[EDGE_PLACES] = {-0.125f, 0.375f, -0.375f, 0.125f};
-static const float places_down[EDGE_PLACES] = {-0.375f, -0.125f, 0.125f, 0.375f};
-
 static void cover_ground(const struct scene *scene, const struct cover *cover)
 {
     float g[4];
@@ -69,18 +62,18 @@ static void cover_ground(const struct scene *scene, const struct cover *cover)
     cover_one_triangle(corners + 1, cover);
 }
 
-/* depths: of the rows that are wanted. */
-static bool cover_rows(struct technique_ctx *ctx, struct scene *scene, const struct view *view,
-    const struct places_pass *which, cover_places *depths, struct pen_error *error)
+bool pass_cover(struct technique_ctx *ctx, struct scene *scene, const struct view *view,
+    const struct places_pass *which, const struct cover_tile *tiles, cover_places *depths,
+    struct pen_error *error)
 {
     const struct cover_scene what = {.blended = which->kind == PLACES_BLENDED,
         .threshold = which->kind == PLACES_SOLID ? SOLID_PER_MILLE / 1000.0f : 0};
-    struct cover cover = {.width = view->width, .height = view->height, .tiles = which->tiles};
+    struct cover cover = {
+        .width = view->width, .height = view->height, .tiles = tiles, .depths = depths};
     struct pass_bands bands;
     bool more = true, ok = true;
     memcpy(cover.world_to_clip, view->world_to_clip, sizeof cover.world_to_clip);
-    memcpy(&cover.across, places_across, sizeof places_across);
-    memcpy(&cover.down, places_down, sizeof places_down);
+    gl_timer_begin(&ctx->timer, PEN_STAGE_GBUFFER, "edge places");
     pass_bands_begin(ctx, &bands, view->width, which->rows, view->width * which->rows, COVER_KIND);
     bands.by_hand = true;
     while (ok && more) {
@@ -89,31 +82,11 @@ static bool cover_rows(struct technique_ctx *ctx, struct scene *scene, const str
         pass_bands_crop(&bands, 1, which->first, view->height, cull.world_to_clip);
         cover.first = which->first + bands.y;
         cover.rows = bands.rows;
-        cover.depths = depths + (size_t)bands.y * view->width;
         cover_scene(scene, &cull, &what, &cover, &bands.piece);
         if (which->ground && !bands.piece.more)
             cover_ground(scene, &cover);
         ok = pass_bands_next(ctx, &bands, &more, error);
     }
-    return ok;
-}
-
-static bool cover(struct technique_ctx *ctx, struct scene *scene, const struct view *view,
-    const struct places_pass *which, struct gl_target *target, struct edges_block *where,
-    struct pen_error *error)
-{
-    gl_timer_begin(&ctx->timer, PEN_STAGE_GBUFFER, "edge places");
-    gl_target_fit(target, GL_RGBA32F, view->width, which->rows, 0, 1);
-    memcpy(where->across, places_across, sizeof places_across);
-    memcpy(where->down, places_down, sizeof places_down);
-    where->rows[0] = (int32_t)which->first;
-    where->rows[1] = (int32_t)which->rows;
-    cover_places *depths = pen_alloc_zero((size_t)view->width * which->rows, sizeof *depths);
-    bool ok = cover_rows(ctx, scene, view, which, depths, error);
-    if (ok)
-        gl.TextureSubImage2D(target->texture.name, 0, 0, 0, (GLsizei)view->width,
-            (GLsizei)which->rows, GL_RGBA, GL_FLOAT, depths);
-    free(depths);
     gl_timer_end(&ctx->timer);
     return ok && pass_turn(ctx, error);
 }
@@ -122,8 +95,6 @@ bool pass_places(struct technique_ctx *ctx, struct scene *scene, const struct vi
     const struct places_pass *which, struct gl_target *depths, struct edges_block *where,
     struct pen_error *error)
 {
-    if (which->tiles)
-        return cover(ctx, scene, view, which, depths, where, error);
     static const float zero[4] = {0};
     enum places_kind kind = which->kind;
     uint32_t first = which->first, rows = which->rows;

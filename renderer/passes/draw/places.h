@@ -1,5 +1,6 @@
 /* Depths at several places in every pixel, of which shading knows one. */
 #pragma once
+#include "renderer/edges/cover.h"
 #include "renderer/technique.h"
 
 #define SHARED_ROWS "renderer/shaders/frame/edges.def"
@@ -11,12 +12,16 @@ enum places_kind { PLACES_ALL, PLACES_SOLID, PLACES_BLENDED }; /* solid: see GBU
 struct places_pass {
     enum places_kind kind;
     bool ground;
-    uint32_t first, rows;           /* of the picture */
-    const struct cover_tile *tiles; /* the CPU draws what these want; NULL: OpenGL draws all */
+    uint32_t first, rows; /* of the picture */
 };
 
 /* What the view sees at EDGE_PLACES places of the pixels in some rows, into a target of so many
- * samples, or on the CPU of so many components. `where`: the places. */
+ * samples. `where`: the places. */
 bool pass_places(struct technique_ctx *ctx, struct scene *scene, const struct view *view,
     const struct places_pass *which, struct gl_target *depths, struct edges_block *where,
+    struct pen_error *error);
+/* The same, drawn by the CPU, of what these tiles want. Software rasterisers take longer for each
+ * triangle, and for all the pixels of which nobody asks. */
+bool pass_cover(struct technique_ctx *ctx, struct scene *scene, const struct view *view,
+    const struct places_pass *which, const struct cover_tile *tiles, cover_places *depths,
     struct pen_error *error);

@@ -5,28 +5,21 @@
 // ALONE: only what the file holds of each pixel without its neighbours.
 // LAYERED: blended surfaces lie in front of some pixels, and a plane has to explain what is solid
 // while the plane of the first of them explains what is nearest.
-// GATHERED: the depths lie in one texel.
 #include "view.glsl"
 #include "octahedral.glsl"
 #include "display.glsl"
 #include "edges.def"
 
-#ifdef GATHERED
-#define Places sampler2D
-#else
-#define Places sampler2DMS
-#endif
-
 layout(binding = UNIT_DEPTH) uniform sampler2D g_depth;
 layout(binding = UNIT_NORMAL) uniform sampler2D g_normal;
-layout(binding = UNIT_TILES) uniform sampler2D tile_classes; // of edge_tiles.frag
-layout(binding = UNIT_PLACES) uniform Places place_depths;   // of some rows
+layout(binding = UNIT_TILES) uniform sampler2D tile_classes;    // of edge_tiles.frag
+layout(binding = UNIT_PLACES) uniform sampler2DMS place_depths; // of some rows
 layout(binding = UNIT_SOURCE) uniform sampler2D picture;
 
 #ifdef LAYERED
 layout(binding = UNIT_BEFORE) uniform sampler2D front_depth; // of the first blended layer
 layout(binding = UNIT_FRONT_NORMAL) uniform sampler2D front_normal;
-layout(binding = UNIT_FRONT_PLACES) uniform Places front_places;
+layout(binding = UNIT_FRONT_PLACES) uniform sampler2DMS front_places;
 #endif
 
 layout(location = 0) out vec4 color;
@@ -70,16 +63,12 @@ float depth_at(ivec2 pixel)
     return texelFetch(g_depth, pixel, 0).r;
 }
 
-vec4 depths_of(Places all, ivec2 pixel)
+vec4 depths_of(sampler2DMS all, ivec2 pixel)
 {
-#ifdef GATHERED
-    return texelFetch(all, pixel, 0);
-#else
     vec4 depths;
     for (int i = 0; i < EDGE_PLACES; i++)
         depths[i] = texelFetch(all, pixel, i).r;
     return depths;
-#endif
 }
 
 bool may_show_edge(ivec2 pixel)

@@ -8,7 +8,7 @@ layout(binding = UNIT_DEPTH) uniform sampler2D g_depth;
 layout(binding = UNIT_BEFORE) uniform sampler2D front_depth; // of the first blended layer
 #endif
 
-// Class / 255; the farthest depth in the tile and beside it; a bit for each pixel, row by row.
+// Class / 255; nothing; a bit for each pixel, row by row.
 layout(location = 0) out vec4 tile_class;
 
 // Depths of four pixels in a row, and of those beside them.
@@ -46,19 +46,16 @@ int bits_of_row(Row above, Row row, Row below)
 }
 
 // A bit for each pixel.
-int bent_pixels(ivec2 first, bool front, out float farthest)
+int bent_pixels(ivec2 first, bool front)
 {
-    vec4 least = vec4(1.0);
     vec4 d[9];
     for (int i = 0; i < 9; i++) {
         vec2 corner = vec2(first + 2 * ivec2(i % 3, i / 3)) * view.viewport.zw;
         d[i] = textureGather(g_depth, corner);
-        least = min(least, d[i]);
 #ifdef LAYERED
         d[i] = front ? max(d[i], textureGather(front_depth, corner)) : d[i];
 #endif
     }
-    farthest = min(min(least.x, least.y), min(least.z, least.w));
     Row above = upper_row(d[0], d[1], d[2]), r0 = lower_row(d[0], d[1], d[2]),
         r1 = upper_row(d[3], d[4], d[5]), r2 = lower_row(d[3], d[4], d[5]),
         r3 = upper_row(d[6], d[7], d[8]), below = lower_row(d[6], d[7], d[8]);
@@ -69,11 +66,9 @@ int bent_pixels(ivec2 first, bool front, out float farthest)
 void main()
 {
     ivec2 first = ivec2(gl_FragCoord.xy) * 4;
-    float farthest;
-    int bent = bent_pixels(first, false, farthest);
+    int bent = bent_pixels(first, false);
 #ifdef LAYERED
-    bent |= bent_pixels(first, true, farthest);
+    bent |= bent_pixels(first, true);
 #endif
-    tile_class =
-        vec4(float(bent != 0 ? TILE_UNDECIDED : TILE_LIT) / 255.0, farthest, float(bent), 0.0);
+    tile_class = vec4(float(bent != 0 ? TILE_UNDECIDED : TILE_LIT) / 255.0, 0.0, float(bent), 0.0);
 }

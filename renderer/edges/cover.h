@@ -1,15 +1,19 @@
 /* Depths at several places of some pixels, drawn by the CPU. Software rasterisers take longer for
  * each triangle, and for all the pixels of which nobody asks. */
 #pragma once
-#include "renderer/scene/cover_alpha.h"
+#include "renderer/edges/cover_alpha.h"
 #include "renderer/scene/scene.h"
 
-enum { COVER_TILE = 4 };
+enum { COVER_TILE = 4, COVER_PIXELS = COVER_TILE * COVER_TILE };
+
+/* Of the places, from a pixel's centre, px: as standard multisampling has them. */
+extern const cover_places cover_across, cover_down;
 
 /* COVER_TILE x COVER_TILE pixels. */
 struct cover_tile {
     float farthest;  /* depth (reversed) that is wanted there */
     uint32_t pixels; /* that are: a bit each, row by row */
+    uint32_t slot;   /* where its places are */
 };
 
 struct cover {
@@ -17,8 +21,7 @@ struct cover {
     uint32_t width, height;         /* of the picture */
     uint32_t first, rows;           /* that are drawn */
     const struct cover_tile *tiles; /* of the whole picture */
-    cover_places across, down;      /* of the places, from a pixel's centre, px */
-    cover_places *depths;           /* width x rows; 0 to begin with; what is not wanted may stay */
+    cover_places *depths; /* COVER_PIXELS per slot; 0 to begin with; what is not wanted may stay */
 };
 
 struct cover_scene {

@@ -1,4 +1,4 @@
-#include "renderer/scene/cover_alpha.h"
+#include "renderer/edges/cover_alpha.h"
 #include <math.h>
 
 void cover_alpha_begin(

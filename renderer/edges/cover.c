@@ -1,12 +1,15 @@
-#include "renderer/scene/cover.h"
+#include "renderer/edges/cover.h"
 #include "protocol/memory.h"
-#include "renderer/scene/cover_alpha.h"
+#include "renderer/edges/cover_alpha.h"
 #include <cglm/cglm.h>
 #include <math.h>
 #include <stdlib.h>
 
 #define BEHIND 0.998f /* what is less than this behind something may be part of it */
 #define FAR_OUT 1e6f  /* px: from here on a corner's place is not exact enough */
+
+const cover_places cover_across = {-0.125f, 0.375f, -0.375f, 0.125f};
+const cover_places cover_down = {-0.375f, -0.125f, 0.125f, 0.375f};
 
 typedef cover_places places;
 typedef cover_bits place_bits;
@@ -99,16 +102,16 @@ static struct plane scaled(const struct plane *p, double factor)
     return (struct plane){p->at * factor, p->across * factor, p->down * factor};
 }
 
-static places over_places(const struct cover *cover, const struct plane *p)
+static places over_places(const struct plane *p)
 {
-    return (float)p->across * cover->across + (float)p->down * cover->down;
+    return (float)p->across * cover_across + (float)p->down * cover_down;
 }
 
-static void step(const struct cover *cover, struct triangle *t)
+static void step(struct triangle *t)
 {
     for (int i = 0; i < 4; i++) {
         const struct plane *p = &t->numbers[i];
-        places offsets = t->offsets[i] = over_places(cover, p);
+        places offsets = t->offsets[i] = over_places(p);
         t->across[i] = (float)p->across;
         t->down[i] = (float)p->down;
         t->tile[i] = COVER_TILE * (float)(fabs(p->across) + fabs(p->down));
@@ -138,11 +141,11 @@ static bool set_up(const struct drawing *d, const struct corner c[3], struct tri
         for (int i = 0; i < 3; i++)
             values[i] = (double)c[i].at[k] * depths[i];
         t->alpha[k] = through(weights, values);
-        t->alpha_offsets[k] = over_places(d->cover, &t->alpha[k]);
+        t->alpha_offsets[k] = over_places(&t->alpha[k]);
     }
     for (int i = 0; i < 3 && area < 0; i++)
         t->numbers[i] = scaled(&t->numbers[i], -1);
-    step(d->cover, t);
+    step(t);
     return true;
 }
 
@@ -166,11 +169,10 @@ static place_bits cut(
     return cover_alpha_cut(d->alpha, at, cover_alpha_level(d->alpha, across, down), covered);
 }
 
-/* pixels: those of the tile, whose first one is at (x, y), that are wanted. */
-static void draw_tile(
-    const struct drawing *d, const struct triangle *t, uint32_t x, uint32_t y, uint32_t pixels)
+/* Of the tile whose first pixel is at (x, y) those pixels. */
+static void draw_tile(const struct drawing *d, const struct triangle *t, uint32_t x, uint32_t y,
+    uint32_t pixels, places *tile)
 {
-    const struct cover *cover = d->cover;
     places first;
     for (int i = 0; i < 4; i++)
         first[i] = (float)plane_at(&t->numbers[i], x + 0.5, y + 0.5);
@@ -185,8 +187,7 @@ static void draw_tile(
         place_bits covered = (all(here[0]) + t->offsets[0] >= 0.0f) &
                              (all(here[1]) + t->offsets[1] >= 0.0f) &
                              (all(here[2]) + t->offsets[2] >= 0.0f);
-        uint32_t px = x + bit % COVER_TILE, py = y + bit / COVER_TILE;
-        places *depths = &cover->depths[(size_t)(py - cover->first) * cover->width + px];
+        places *depths = &tile[bit];
         /* Slivers' planes are steep. */
         places depth = all(here[3]) + t->offsets[3];
         depth = choose(depth > t->nearest, all(t->nearest), depth);
@@ -195,7 +196,7 @@ static void draw_tile(
         if (!any(covered))
             continue;
         if (d->alpha)
-            covered = cut(d, t, px + 0.5, py + 0.5, covered);
+            covered = cut(d, t, x + bit % COVER_TILE + 0.5, y + bit / COVER_TILE + 0.5, covered);
         *depths = choose(covered, depth, *depths);
     }
 }
@@ -237,7 +238,7 @@ static void draw(const struct drawing *d, const struct corner c[3])
             if (!ready && !set_up(d, c, &t))
                 return;
             ready = true;
-            draw_tile(d, &t, x, y, pixels);
+            draw_tile(d, &t, x, y, pixels, cover->depths + (size_t)tile->slot * COVER_PIXELS);
         }
 }
 

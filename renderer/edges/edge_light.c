@@ -1,0 +1,392 @@
+#include "renderer/edges/edge_light.h"
+#include "protocol/srgb.h"
+#include <math.h>
+#include <string.h>
+
+#define SAME 1 /* of 255: blending what differs by no more changes no more */
+#define AROUND (COVER_TILE + 2)
+#define GUESSES 1024
+#define HALF_MAX 65504.0f
+
+typedef cover_places four;
+
+/* A number that is linear over the picture: at a pixel's centre, and per pixel. */
+struct plane {
+    float at, across, down;
+};
+
+/* What is seen at a pixel. */
+struct look {
+    four light; /* times alpha */
+    struct plane solid, front;
+};
+
+/* A tile, and what lies beside it. */
+struct around {
+    const struct edge_rows *e;
+    uint32_t x, y;
+    uint64_t known; /* bits, as looks */
+    struct look looks[AROUND * AROUND];
+};
+
+static float linear_of[256];
+static float code_begins[257]; /* the least light that is nearest to a code */
+static uint8_t guesses[GUESSES];
+
+static void make_tables(void)
+{
+    if (code_begins[256] > 0)
+        return;
+    for (int i = 0; i < 256; i++)
+        linear_of[i] = (float)pen_srgb_decode(i / 255.0);
+    for (int i = 1; i < 256; i++)
+        code_begins[i] = (float)pen_srgb_decode((i - 0.5) / 255);
+    for (int i = 0, code = 0; i < GUESSES; i++) {
+        while (code < 255 && code_begins[code + 1] <= (float)i / GUESSES)
+            code++;
+        guesses[i] = (uint8_t)code;
+    }
+    code_begins[256] = INFINITY;
+}
+
+static uint8_t code_of(float light)
+{
+    if (!(light > 0))
+        return 0;
+    if (light >= 1)
+        return 255;
+    uint32_t code = guesses[(int)(light * GUESSES)];
+    while (light >= code_begins[code + 1])
+        code++;
+    return (uint8_t)code;
+}
+
+static four all(float value)
+{
+    return (four){value, value, value, value};
+}
+
+static four choose(cover_bits which, four a, four b)
+{
+    return (four)((which & (cover_bits)a) | (~which & (cover_bits)b));
+}
+
+static four size(four a)
+{
+    return (four)((cover_bits)a & 0x7fffffff);
+}
+
+static four larger(four a, four b)
+{
+    return choose(a > b, a, b);
+}
+
+static bool any(cover_bits bits)
+{
+    typedef int64_t pairs __attribute__((vector_size(16)));
+    pairs p = (pairs)bits;
+    return p[0] | p[1];
+}
+
+static four load(const float *from)
+{
+    four v;
+    memcpy(&v, from, sizeof v);
+    return v;
+}
+
+uint32_t edge_stride(uint32_t width)
+{
+    return (width + COVER_TILE - 1) / COVER_TILE * COVER_TILE + 2 * EDGE_MARGIN;
+}
+
+uint32_t edge_pixel_bytes(const struct pen_plane *plane)
+{
+    return plane->pixel == PEN_PIXEL_RGBA8 ? 4 : plane->pixel == PEN_PIXEL_RGBA16F ? 8 : 16;
+}
+
+/* Of the row `number` of the picture, whose column 0 it points to. */
+static float *row_at(const struct edge_rows *e, float *depths, uint32_t number)
+{
+    return depths + (size_t)(number + 1 - e->first) * edge_stride(e->view->width) + EDGE_MARGIN;
+}
+
+void edge_pad(const struct edge_rows *e, float *depths)
+{
+    uint32_t width = e->view->width, height = e->view->height, stride = edge_stride(width);
+    uint32_t end = e->first + (e->rows + COVER_TILE - 1) / COVER_TILE * COVER_TILE + 1;
+    for (uint32_t y = e->first ? e->first - 1 : 0; y < end && y < height; y++) {
+        float *row = row_at(e, depths, y);
+        row[-1] = row[0];
+        for (uint32_t x = width; x < stride - EDGE_MARGIN; x++)
+            row[x] = row[width - 1];
+    }
+    if (e->first == 0)
+        memcpy(depths, depths + stride, stride * sizeof *depths);
+    for (uint32_t y = height; y < end; y++)
+        memcpy(row_at(e, depths, y) - EDGE_MARGIN, row_at(e, depths, height - 1) - EDGE_MARGIN,
+            stride * sizeof *depths);
+}
+
+/* Along a plane a depth is the mean of those on either side. A bit for each of four pixels. */
+static uint32_t bent_pixels(const float *row, uint32_t stride)
+{
+    four depth = load(row), left = load(row - 1), right = load(row + 1);
+    four above = load(row - stride), below = load(row + stride), twice = depth + depth;
+    four bend = larger(size(left + right - twice), size(above + below - twice));
+    four rise = size(left - right) + size(above - below) + 2e-4f * depth;
+    cover_bits bent = (bend > 0.1f * rise) & (cover_bits){1, 2, 4, 8};
+    return any(bent) ? (uint32_t)(bent[0] | bent[1] | bent[2] | bent[3]) : 0;
+}
+
+static uint32_t bent_in_tile(const struct edge_rows *e, float *depths, uint32_t x, uint32_t y)
+{
+    uint32_t bits = 0, stride = edge_stride(e->view->width);
+    const float *row = row_at(e, depths, y) + x;
+    for (uint32_t i = 0; i < COVER_TILE; i++, row += stride)
+        bits |= bent_pixels(row, stride) << COVER_TILE * i;
+    return bits;
+}
+
+static float farthest_around(const struct edge_rows *e, uint32_t x, uint32_t y)
+{
+    uint32_t stride = edge_stride(e->view->width);
+    const float *row = row_at(e, e->solid.depths, y) + x - stride;
+    four least = load(row);
+    for (uint32_t i = 0; i < AROUND; i++, row += stride) {
+        least = -larger(-least, -load(row - 1));
+        least = -larger(-least, -load(row + 1));
+    }
+    float a = least[0] < least[1] ? least[0] : least[1];
+    float b = least[2] < least[3] ? least[2] : least[3];
+    return a < b ? a : b;
+}
+
+static uint32_t clamped(uint32_t i, int step, uint32_t count)
+{
+    return (step < 0 && i == 0) || (step > 0 && i + 1 == count) ? i : i + (uint32_t)step;
+}
+
+static const uint8_t *before_at(const struct edge_rows *e, uint32_t x, uint32_t y)
+{
+    size_t pixel = (size_t)(y + 1 - e->first) * e->view->width + x;
+    return e->before + pixel * edge_pixel_bytes(e->plane);
+}
+
+/* Not one colour all around. */
+static bool differs(const struct edge_rows *e, uint32_t x, uint32_t y)
+{
+    if (e->plane->pixel != PEN_PIXEL_RGBA8)
+        return true;
+    const uint8_t *own = before_at(e, x, y);
+    for (int down = -1; down <= 1; down++)
+        for (int across = -1; across <= 1; across++) {
+            const uint8_t *other =
+                before_at(e, clamped(x, across, e->view->width), clamped(y, down, e->view->height));
+            for (int k = 0; k < 4; k++)
+                if (own[k] > other[k] + SAME || other[k] > own[k] + SAME)
+                    return true;
+        }
+    return false;
+}
+
+static uint32_t wanted_pixels(const struct edge_rows *e, uint32_t x, uint32_t y)
+{
+    uint32_t bits = bent_in_tile(e, e->solid.depths, x, y), wanted = 0;
+    if (e->layered)
+        bits |= bent_in_tile(e, e->nearest, x, y);
+    for (; bits; bits &= bits - 1) {
+        uint32_t bit = (uint32_t)__builtin_ctz(bits);
+        uint32_t px = x + bit % COVER_TILE, py = y + bit / COVER_TILE;
+        if (px < e->view->width && py < e->view->height && differs(e, px, py))
+            wanted |= 1u << bit;
+    }
+    return wanted;
+}
+
+uint32_t edge_find(const struct edge_rows *e, struct cover_tile *tiles)
+{
+    uint32_t across = (e->view->width + COVER_TILE - 1) / COVER_TILE, slots = 0;
+    for (uint32_t y = e->first; y < e->first + e->rows; y += COVER_TILE)
+        for (uint32_t column = 0; column < across; column++) {
+            struct cover_tile *tile = &tiles[y / COVER_TILE * across + column];
+            *tile = (struct cover_tile){.pixels = wanted_pixels(e, column * COVER_TILE, y)};
+            if (!tile->pixels)
+                continue;
+            tile->farthest = farthest_around(e, column * COVER_TILE, y);
+            tile->slot = slots++;
+        }
+    return slots;
+}
+
+static float dot(const float a[3], const float b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+/* octahedral_direction() */
+static void direction(const uint16_t code[4], float n[3])
+{
+    n[0] = (float)code[0] * (2 / 65535.0f) - 1;
+    n[1] = (float)code[1] * (2 / 65535.0f) - 1;
+    n[2] = 1 - fabsf(n[0]) - fabsf(n[1]);
+    float t = n[2] < 0 ? -n[2] : 0;
+    n[0] += n[0] >= 0 ? -t : t;
+    n[1] += n[1] >= 0 ? -t : t;
+}
+
+/* plane_of() */
+static struct plane plane_of(
+    const struct edge_rows *e, float depth, const uint16_t normal[4], uint32_t x, uint32_t y)
+{
+    const struct view *v = e->view;
+    float n[3];
+    direction(normal, n);
+    float across = dot(n, v->right) / e->focal, down = -dot(n, v->up) / e->focal;
+    float facing = dot(n, v->forward) + across * ((float)x + 0.5f - 0.5f * (float)v->width) +
+                   down * ((float)y + 0.5f - 0.5f * (float)v->height);
+    float scale = depth / (facing < -1e-4f ? facing : -1e-4f);
+    return (struct plane){depth, across * scale, down * scale};
+}
+
+static float half_to_float(uint16_t half)
+{
+    uint32_t bits = (uint32_t)(half & 0x7fff) << 13;
+    float value;
+    memcpy(&value, &bits, sizeof value);
+    return half & 0x8000 ? -value * 0x1p112f : value * 0x1p112f;
+}
+
+/* Of what is finite and not negative; to the nearest, even ones first. */
+static uint16_t float_to_half(float value)
+{
+    uint32_t bits;
+    value = (value < HALF_MAX ? value : HALF_MAX) * 0x1p-112f;
+    memcpy(&bits, &value, sizeof bits);
+    return (uint16_t)((bits + 0xfff + (bits >> 13 & 1)) >> 13);
+}
+
+/* light_of() */
+static four light_at(const struct edge_rows *e, uint32_t x, uint32_t y)
+{
+    const uint8_t *at = before_at(e, x, y);
+    float c[4];
+    if (e->plane->pixel == PEN_PIXEL_RGBA8) {
+        float a = (float)at[3] / 255;
+        return (four){linear_of[at[0]], linear_of[at[1]], linear_of[at[2]], 1} * a;
+    }
+    for (int k = 0; k < 4; k++)
+        if (e->plane->pixel == PEN_PIXEL_RGBA16F)
+            c[k] = half_to_float(((const uint16_t *)(const void *)at)[k]);
+        else
+            c[k] = ((const float *)(const void *)at)[k];
+    for (int k = 0; k < 3 && !e->raw; k++)
+        c[k] = pen_srgb_decodef(c[k]) * c[3];
+    return load(c);
+}
+
+static void store_light(const struct edge_rows *e, uint32_t x, uint32_t y, four light)
+{
+    uint8_t *at = e->plane->data;
+    at += ((size_t)y * e->view->width + x) * edge_pixel_bytes(e->plane);
+    float alpha = light[3];
+    if (!e->raw)
+        light = alpha > 0 ? light / alpha : all(0);
+    for (int k = 0; k < 4; k++) {
+        float value = k == 3 ? alpha : light[k];
+        if (e->plane->pixel == PEN_PIXEL_RGBA8)
+            at[k] = k == 3 ? (uint8_t)(255 * (alpha < 1 ? alpha : 1) + 0.5f) : code_of(value);
+        else if (e->plane->pixel == PEN_PIXEL_RGBA16F)
+            ((uint16_t *)(void *)at)[k] = float_to_half(value);
+        else
+            ((float *)(void *)at)[k] = k == 3 || e->raw ? value : pen_srgb_encodef(value);
+    }
+}
+
+static const struct look *look_at(struct around *a, uint32_t x, uint32_t y)
+{
+    const struct edge_rows *e = a->e;
+    uint32_t i = (y + 1 - a->y) * AROUND + (x + 1 - a->x), width = e->view->width;
+    struct look *look = &a->looks[i];
+    if (a->known >> i & 1)
+        return look;
+    a->known |= UINT64_C(1) << i;
+    size_t normal = (size_t)(y + 1 - e->first) * width + x;
+    look->light = light_at(e, x, y);
+    float depth = row_at(e, e->solid.depths, y)[x];
+    look->solid = look->front = plane_of(e, depth, e->solid.normals[normal], x, y);
+    float before = e->layered ? row_at(e, e->front.depths, y)[x] : 0;
+    if (before > 0)
+        look->front = plane_of(e, before, e->front.normals[normal], x, y);
+    return look;
+}
+
+/* match() */
+static four match(const struct plane *plane, four depths, float across, float down)
+{
+    if (plane->at == 0)
+        return choose(depths == 0.0f, all(10), all(1e-9f));
+    four miss = plane->at - plane->across * across - plane->down * down - depths;
+    miss = size(miss + plane->across * cover_across + plane->down * cover_down);
+    four rise =
+        fabsf(plane->across) + fabsf(plane->down) + 1e-20f + 1e-3f * larger(depths, all(plane->at));
+    return rise / (miss + 0.1f * rise);
+}
+
+static four match_both(const struct edge_rows *e, const struct look *look, four solid, four front,
+    float across, float down)
+{
+    four how = match(&look->solid, solid, across, down);
+    if (e->layered)
+        how = -larger(-how, -match(&look->front, front, across, down));
+    return how;
+}
+
+/* As edges.frag. slot: number of the pixel's places. */
+static void blend_pixel(struct around *a, uint32_t x, uint32_t y, size_t slot)
+{
+    const struct edge_rows *e = a->e;
+    four solid = e->solid.places[slot];
+    four front = e->layered ? larger(solid, e->front.places[slot]) : solid;
+    const struct look *own = look_at(a, x, y);
+    four weights = match_both(e, own, solid, front, 0, 0);
+    four open = 4 - 0.6f * weights; /* 0 where the pixel's own plane explains the place */
+    open = choose(open < 1.0f, larger(open, all(0)), all(1));
+    if (!any(open > 0.0f))
+        return;
+    four sums[COVER_PLACES], light = all(0);
+    for (int i = 0; i < COVER_PLACES; i++)
+        sums[i] = weights[i] * own->light;
+    for (int k = 0; k < 9; k++) {
+        if (k == 4)
+            continue;
+        uint32_t px = clamped(x, k % 3 - 1, e->view->width);
+        uint32_t py = clamped(y, k / 3 - 1, e->view->height);
+        const struct look *other = look_at(a, px, py);
+        four weight = open * match_both(e, other, solid, front, (float)(int32_t)(px - x),
+                                 (float)(int32_t)(py - y));
+        weights += weight;
+        for (int i = 0; i < COVER_PLACES; i++)
+            sums[i] += weight[i] * other->light;
+    }
+    weights = 1 / (COVER_PLACES * weights);
+    for (int i = 0; i < COVER_PLACES; i++)
+        light += sums[i] * weights[i];
+    store_light(e, x, y, light);
+}
+
+void edge_blend(const struct edge_rows *e, const struct cover_tile *tiles, uint32_t y)
+{
+    uint32_t across = (e->view->width + COVER_TILE - 1) / COVER_TILE;
+    make_tables();
+    for (uint32_t column = 0; column < across; column++) {
+        const struct cover_tile *tile = &tiles[y / COVER_TILE * across + column];
+        struct around around;
+        around.e = e, around.x = column * COVER_TILE, around.y = y, around.known = 0;
+        for (uint32_t left = tile->pixels; left; left &= left - 1) {
+            uint32_t bit = (uint32_t)__builtin_ctz(left);
+            blend_pixel(&around, around.x + bit % COVER_TILE, y + bit / COVER_TILE,
+                (size_t)tile->slot * COVER_PIXELS + bit);
+        }
+    }
+}

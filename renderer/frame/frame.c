@@ -211,16 +211,22 @@ static void aim_light(const struct frame *f, uint32_t light)
         gl_target_clear(vis, f->lights[light].faces[0].emission_mean);
 }
 
+static bool shows_sketch(const struct frame *f)
+{
+    return is_picture(f) && frame_progress_wants_sketch(&f->progress);
+}
+
 /* Somebody looks, and there are several lights, or faces of one: SKETCH_SAMPLES of each come first,
- * or there would be nothing to see before the last is at work. A method without steps has to be
- * shown in time: it begins with cheaper settings. False: neither. */
+ * or there would be nothing to see before the last is at work. A method without steps that has to be
+ * shown in time, or soon, begins with cheaper settings. False: neither. */
 static bool lower(const struct frame *f, uint32_t *params)
 {
     const struct technique *technique = f->job->technique;
     const struct pen_param *row = pen_param_find(technique->info.params, "samples");
     const double few = SKETCH_SAMPLES;
     if (technique->sketch)
-        return frame_progress_is_limited(&f->progress) && frame_progress_lower(technique, params);
+        return (frame_progress_is_limited(&f->progress) || shows_sketch(f)) &&
+               frame_progress_lower(technique, params);
     return f->progress.faces > 1 && f->progress.tracked && row &&
            pen_param_load(row, params, 0) >= 4 * few &&
            pen_param_store(row, params, &few, "", NULL);
@@ -249,6 +255,8 @@ static bool sketch(struct frame *f, uint32_t first, uint32_t end, bool *is, stru
     return ok;
 }
 
+static bool show_estimate(struct frame *f, struct pen_error *error);
+
 /* In the first jittered frame. */
 static bool begin(struct frame *f, struct pen_error *error)
 {
@@ -262,9 +270,13 @@ static bool begin(struct frame *f, struct pen_error *error)
         frame_progress_sketch(p, p->faces, SKETCH_SAMPLES);
     if (!is || steps)
         return true;
-    f->result->progress.done = 1; /* something is there */
-    frame_progress_sketched(p, frame_progress_ms(p) - start, true);
-    return true;
+    if (frame_progress_is_limited(p)) {
+        f->result->progress.done = 1; /* something is there */
+        frame_progress_sketched(p, frame_progress_ms(p) - start, true);
+    }
+    bool ok = !shows_sketch(f) || show_estimate(f, error);
+    frame_progress_spent(p);
+    return ok;
 }
 
 /* The time was up in the midst of a light that there is a sketch of; those after it have theirs. */
@@ -494,13 +506,6 @@ static bool show_estimate(struct frame *f, struct pen_error *error)
     return ok;
 }
 
-/* Layers that count the work are only complete with the frame. */
-static bool can_show_estimate(const struct pen_request *r)
-{
-    return r->output.layer != PEN_LAYER_ALL &&
-           (frame_needs(r, PEN_SOURCE_BEAUTY) || frame_needs(r, PEN_SOURCE_VISIBILITY));
-}
-
 static enum technique_step on_step(struct technique_run *run, uint32_t done, uint32_t total)
 {
     struct frame *f = container_of(run->watch, struct frame, watch);
@@ -517,7 +522,7 @@ static bool on_show(struct technique_run *run, struct pen_error *error)
     struct frame_progress *p = &f->progress;
     struct technique_run bounded = *run;
     bool ok = bound_faces(f, &bounded, error) && frame_progress_compare(p, error) &&
-              (!p->show_wanted || !can_show_estimate(f->job->request) || show_estimate(f, error));
+              (!p->show_wanted || !frame_can_show(f->job->request) || show_estimate(f, error));
     aim_face(f, (struct light_face *)run->face);
     frame_progress_spent(p);
     return ok;
@@ -580,13 +585,7 @@ bool frame_render(const struct frame_job *job, struct pen_frame *frame, struct p
         goto done;
     if (!frame_output_read(job, &f.view, f.progress.frames + !f.progress.frames, frame, error))
         goto done;
-    frame_progress_tell(&f.progress, result);
-    if (f.progress.stopped && !result->progress.done)
-        pen_result_warn(result, "Its time was up: the shadows are a sketch (%s at most).",
-            job->technique->sketch);
-    else if (f.progress.stopped)
-        pen_result_warn(result, "Its time was up: the picture rests on %u of %u samples.",
-            result->progress.done, result->progress.total);
+    frame_progress_end(&f.progress, result);
     frame_layers_end(job, &f.work, f.classified, result);
     gl_timer_collect(&job->ctx->timer, result);
     result->shadow_inputs_reused = shadow_cache_all_reused(job->ctx);

@@ -15,6 +15,13 @@ static inline bool frame_needs_shadows(const struct pen_request *r)
            pen_layers[r->output.layer].source != PEN_SOURCE_GBUFFER;
 }
 
+/* It can be shown before it is complete; layers that count the work cannot. */
+static inline bool frame_can_show(const struct pen_request *r)
+{
+    return r->output.layer != PEN_LAYER_ALL &&
+           (frame_needs(r, PEN_SOURCE_BEAUTY) || frame_needs(r, PEN_SOURCE_VISIBILITY));
+}
+
 /* The picture is made of layers: see blended.h. */
 static inline bool frame_is_layered(const struct frame_job *job)
 {

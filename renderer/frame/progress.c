@@ -1,4 +1,5 @@
 #include "renderer/frame/progress.h"
+#include "renderer/frame/needs.h"
 #include "protocol/memory.h"
 #include "renderer/passes/draw/kept_sums.h"
 #include "renderer/passes/draw/screen.h"
@@ -9,7 +10,15 @@
 #define SHARED_ROWS "renderer/shaders/frame/progress.def"
 #include "renderer/shared/rows_c.h"
 
+/* A sketch and its picture take up to two fifths of what a frame takes: of so many it is a tenth. */
+#define SKETCH_FRAMES 4
 #define LEAST_SHARE 0.03 /* of the render's time may go into estimates of its error */
+
+static bool is_watched(const struct frame_progress *p)
+{
+    const struct pen_viewer *viewer = &p->job->viewer;
+    return viewer->wants && viewer->wants(viewer->context);
+}
 
 void frame_progress_begin(
     struct frame_progress *p, const struct frame_job *job, uint32_t lights, uint32_t faces)
@@ -20,8 +29,15 @@ void frame_progress_begin(
         .begun_ms = gl_now_ms(),
         .standard_error = -1,
         .total = 1};
-    p->tracked = frame_progress_is_limited(p) ||
-                 (job->viewer.wants && job->viewer.wants(job->viewer.context));
+    p->tracked = frame_progress_is_limited(p) || is_watched(p);
+}
+
+bool frame_progress_wants_sketch(const struct frame_progress *p)
+{
+    const struct technique *technique = p->job->technique;
+    const struct pen_request *r = p->job->request;
+    return technique->sketch && technique->info.cost_class >= PEN_COST_HEAVY &&
+           r->antialias >= SKETCH_FRAMES && frame_can_show(r) && is_watched(p);
 }
 
 bool frame_progress_is_limited(const struct frame_progress *p)
@@ -100,7 +116,7 @@ static enum technique_step step(struct frame_progress *p, uint32_t samples)
     bool owes = p->tracked && !has_error(p); /* however quick the samples are */
     if (!first && !owes && p->extra_ms + p->last_extra_ms > share * now)
         return STEP_GO_ON;
-    p->show_wanted = viewer->wants && viewer->wants(viewer->context);
+    p->show_wanted = is_watched(p);
     bool more = are_apart(p) ? p->kept_unit != p->unit || p->own >= 2 * p->kept_own
                              : samples >= 2 * p->kept_done;
     bool compare = p->tracked && more;
@@ -286,4 +302,15 @@ void frame_progress_tell(struct frame_progress *p, struct pen_result *result)
         .kept = p->faces ? (uint32_t)(kept_sums_taken(p->job->sums) / p->faces) : 0,
         .standard_error = are_apart(p) ? combine(p) : p->standard_error,
         .elapsed_ms = (float)(gl_now_ms() - p->begun_ms)};
+}
+
+void frame_progress_end(struct frame_progress *p, struct pen_result *result)
+{
+    frame_progress_tell(p, result);
+    if (p->stopped && !result->progress.done)
+        pen_result_warn(result, "Its time was up: the shadows are a sketch (%s at most).",
+            p->job->technique->sketch);
+    else if (p->stopped)
+        pen_result_warn(result, "Its time was up: the picture rests on %u of %u samples.",
+            result->progress.done, result->progress.total);
 }

@@ -35,6 +35,9 @@ struct frame_progress {
 
 void frame_progress_begin(
     struct frame_progress *p, const struct frame_job *job, uint32_t lights, uint32_t faces);
+/* Somebody would like to see something now, and the picture takes long and has nothing to show
+ * before its first frame is complete but a sketch. */
+bool frame_progress_wants_sketch(const struct frame_progress *p);
 /* Somebody may want what is not complete. */
 bool frame_progress_is_limited(const struct frame_progress *p);
 /* Of each of so many lights or faces of one there are a few samples. */
@@ -58,3 +61,5 @@ void frame_progress_spent(struct frame_progress *p);
 double frame_progress_ms(const struct frame_progress *p);
 /* Says in the result how far the next picture got. */
 void frame_progress_tell(struct frame_progress *p, struct pen_result *result);
+/* The same of the last one, with a warning where that is not the end. */
+void frame_progress_end(struct frame_progress *p, struct pen_result *result);

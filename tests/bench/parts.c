@@ -113,7 +113,7 @@ static void make_request(
 
 int main(int argc, char **argv)
 {
-    static const char *const names[] = {"raytraced", "multisample"};
+    const char *names[] = {"raytraced", "multisample"};
     struct pen_renderer_config config = {0};
     struct pen_error error = {0};
     struct pen_generated_options options = {.kind = PEN_GENERATED_DEMO};
@@ -121,7 +121,8 @@ int main(int argc, char **argv)
     int rounds = argc > 1 ? atoi(argv[1]) : 5;
     rounds = rounds < 1 ? 1 : rounds > MAX_ROUNDS ? MAX_ROUNDS : rounds;
     double samples = argc > 2 ? atof(argv[2]) : 1024;
-    const char *only = argc > 3 ? argv[3] : NULL;
+    int methods = argc > 3 ? 1 : 2;
+    names[0] = argc > 3 ? argv[3] : names[0];
     struct pen_renderer *r = pen_renderer_create(&config, &error);
     FILE *file = tmpfile();
     void *data = NULL;
@@ -135,12 +136,10 @@ int main(int argc, char **argv)
     struct pen_request pcss, sampled;
     make_request(&pcss, id, "pcss", 0);
     measure(r, &pcss, TURN_MS, NULL); /* compiles */
-    for (int m = 0; m < 2; m++) {
+    for (int m = 0; m < methods; m++) {
         double first[MAX_ROUNDS], ratios[4][MAX_ROUNDS];
         struct cost one_piece = {0}, quick = {0};
         struct watching watching;
-        if (only && strcmp(only, names[m]) != 0)
-            continue;
         make_request(&sampled, id, names[m], samples);
         measure(r, &sampled, TURN_MS, &watching);
         for (int i = 0; i < rounds; i++) {

@@ -126,6 +126,34 @@ static void check_falling(struct pen_renderer *r, const struct pen_request *requ
     pen_frame_finish(&last);
 }
 
+/* What has nothing to show before its first frame is complete shows a sketch of that: nearer to it than
+ * one without shadows is. */
+static void check_sketch(
+    struct pen_renderer *r, const uint8_t scene[PEN_ID_BYTES], const char *technique)
+{
+    const char *const names[] = {technique, "none"};
+    struct parts parts[2] = {{.count = 0}};
+    struct pen_request request;
+    struct pen_frame plain, watched;
+    struct pen_result result;
+    for (int i = 0; i < 2; i++) {
+        make_request(&request, scene, names[i], 4);
+        CHECK(render(r, &request, INFINITY, NULL, &plain, &result));
+        pen_renderer_drop_shadows(r);
+        CHECK(render(r, &request, i ? INFINITY : 0, &parts[i], &watched, &result));
+        CHECK(fixture_distance(&plain, &watched) == 0);
+        CHECK(parts[i].count == (i ? 3 : 4) && result.progress.done == 4);
+        pen_frame_finish(&watched), pen_frame_finish(&plain);
+    }
+    CHECK(parts[0].results[0].progress.done == 0 && parts[0].results[0].progress.total == 4);
+    const struct pen_frame *first = &parts[0].frames[1];
+    double off = fixture_distance(&parts[0].frames[0], first);
+    double empty = fixture_distance(&parts[1].frames[0], first);
+    printf("%s: sketch off %.3f, without shadows %.3f\n", technique, off, empty);
+    CHECK(off > 0 && off < 0.5 * empty);
+    finish(&parts[0]), finish(&parts[1]);
+}
+
 int main(void)
 {
     struct pen_error error;
@@ -142,6 +170,8 @@ int main(void)
         make_request(&request, scene, names[i], 2);
         check_watching(r, &request);
     }
+    check_sketch(r, scene, "bilateral");
+    check_sketch(r, scene, "adaptive-sampling");
     for (int i = 0; i < 2; i++) { /* something of all lights is there first */
         make_request(&request, scene, names[i], 1);
         request.lights_given = true;

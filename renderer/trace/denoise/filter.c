@@ -41,7 +41,8 @@ static uint32_t plan_block(struct denoise *d, uint32_t bx, uint32_t by)
 {
     uint32_t width = d->job->width, height = d->job->height, narrow = 0;
     float reach = reach_around(d, bx, by), half = reach < INFINITY ? WIDTH * reach : 0;
-    uint8_t radius = half < 1 ? 0 : half < 2 ? 1 : half < 4 ? 2 : half < 8 ? 4 : 8;
+    /* Windows over a power of two have points that are spread well: the next one. */
+    uint8_t radius = half < 1 ? 0 : half < NARROW ? 1 : half < 2.8f ? 2 : half < 5.7f ? 4 : 8;
     if (d->emitter.type == PEN_TRACE_POINT)
         radius = 0;
     d->radius[by * d->blocks_x + bx] = radius;

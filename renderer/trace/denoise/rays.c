@@ -136,7 +136,9 @@ static void add_value(
 
 static float horizon_fade(const struct denoise *d, const struct trace_packet *packet, uint32_t lane)
 {
-    if (!packet->active[lane] || least_height(d, packet, lane) > 0)
+    if (!packet->active[lane]) /* no light of its neighbours' either */
+        return 0;
+    if (least_height(d, packet, lane) > 0)
         return 1;
     float share = pen_trace_horizon_share(packet->cos_base[lane], packet->cos_a[lane],
         packet->cos_b[lane], d->emitter.type != PEN_TRACE_RECT);
@@ -212,7 +214,8 @@ static void sample_block(struct denoise *d, uint32_t x0, uint32_t y0)
         d->fade[pixel] = b.is[lane] && !same ? horizon_fade(d, &b.packet, lane) : 1;
         if (same)
             continue;
-        set_normal(d, pixel, b.receivers[lane].normal, 1); /* 0 where there is none */
+        /* What is turned from the light says nothing of its neighbours: as what is no receiver. */
+        set_normal(d, pixel, b.packet.active[lane] ? b.receivers[lane].normal : zero, 1);
         set_value(d, pixel, b.is[lane] ? zero : d->mean_emission, b.is[lane] ? 0 : 1);
         if (!b.is[lane])
             continue;

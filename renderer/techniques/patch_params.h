@@ -34,6 +34,6 @@ static inline bool patch_tiles(struct technique_run *run, uint32_t map_size, flo
         &(struct classify_desc){.map_size = map_size,
             .margin_texels = min_filter + 1,
             .umbra = umbra,
-            .bound = BOUND_PLANE},
+            .bound = BOUND_SURFACE},
         tiles, error);
 }

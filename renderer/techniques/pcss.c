@@ -38,7 +38,7 @@ static bool record(struct technique_run *run, struct pen_error *error)
     struct classify_desc classes = {.map_size = params->map_size,
         .margin_texels = params->min_filter + 1,
         .umbra = true,
-        .bound = BOUND_PLANE};
+        .bound = BOUND_SURFACE};
     const struct gl_texture *tiles;
     if (!pass_classify(run, &classes, &tiles, error))
         return false;
@@ -58,8 +58,8 @@ const struct technique technique_pcss = {
                    "filters depth comparisons over that width.",
         .citation = "R. Fernando, Percentage-closer soft shadows, SIGGRAPH 2005 sketches",
         .artefacts =
-            "One average depth merges near and far casters, which lets light through where "
-            "several hide the light together; thin blockers can be missed by the search; "
+            "One average depth merges near and far casters: penumbrae of both are of a width "
+            "between theirs; thin blockers can be missed by the search; "
             "seen from the centre of the light only." BLENDED_GRAIN,
         .cost_class = PEN_COST_MEDIUM,
         .textured = false,

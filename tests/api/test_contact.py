@@ -95,11 +95,11 @@ class Contact(unittest.TestCase):
         self.assertEqual(answer.status, 200, answer.body[:300])
         return [p[0] for p in rgb(answer)]
 
-    def check_dark(self, scene, request, methods, most=0):
+    def check_dark(self, scene, request, methods, most=0, grey=60):
         """Everything in view lies in umbra."""
         for method in methods:
             with self.subTest(method=method, lights=request["lights"]):
-                lit = sum(v > 60 for v in self.visibility(scene, request, method))
+                lit = sum(v > grey for v in self.visibility(scene, request, method))
                 self.assertLessEqual(lit, most)
 
     def test_no_method_lights_the_seam_of_wall_and_floor(self):
@@ -143,6 +143,8 @@ class Contact(unittest.TestCase):
                     seen = self.visibility(scene, request, method)
                     lit = sum(v > 60 and t == 0 for v, t in zip(seen, truth))
                     self.assertLessEqual(lit, 10 if request is room else 0)
+                    grey = sum(v > 12 and t == 0 for v, t in zip(seen, truth))
+                    self.assertLessEqual(grey, 60 if request is room else 0)
 
     def test_the_background_sees_every_light(self):
         """Also in tiles that are filled as a whole."""
@@ -158,10 +160,12 @@ class Contact(unittest.TestCase):
                 self.assertEqual({v for v, away in zip(seen, behind) if away}, {255})
 
     def test_closed_room_is_dark(self):
+        """Also where a light is so large that only its walls and its roof together hide it."""
         scene = self.d.upload(solids(((4, 3, 4), (0, 1.5, 0), 0)))
-        self.check_dark(scene, {
-            "camera": {"eye": [1.5, 1.5, 1.5], "target": [-1.5, 0.8, -1.5], "fov_y_deg": 75},
-            "lights": [{**SUN, "position": [5, 7, 3]}]}, self.methods)
+        view = {"camera": {"eye": [1.5, 1.5, 1.5], "target": [-1.5, 0.8, -1.5], "fov_y_deg": 75}}
+        self.check_dark(scene, {**view, "lights": [{**SUN, "position": [5, 7, 3]}]}, self.methods)
+        self.check_dark(scene, {**view, "lights": [rect(4, 5, 3)]},
+                        ("pcss", "mssm", "accumulation", "backprojection", "bitmask"), 10, 12)
 
     def test_box_keeps_its_shadow_on_a_wide_ground(self):
         points, normals, indices = box((1, 1, 1), (0, 0.5, 0))

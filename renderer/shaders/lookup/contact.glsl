@@ -112,12 +112,14 @@ struct Around {
     bool all_block;
     float nearest; // of those that block
     float left;    // of the light, by a caster that touches the receiver
+    vec4 z[4];     // around each of its own texel's corners
 };
 
 Around look_around(Surface s, Contact c, Beside beside)
 {
     vec2 size = vec2(textureSize(shadow_map, 0)), base = floor(c.at), g = c.plane.gradient;
-    Around a = Around(false, 1.0, 1.0);
+    Around a;
+    a.nearest = a.left = 1.0;
     // The bounds of loops are dynamic: software rasterisers run both sides of a branch.
     int corners = beside.casters || beside.all_block ? 4 : 0;
     float farthest = -1.0;
@@ -128,6 +130,7 @@ Around look_around(Surface s, Contact c, Beside beside)
         float there = c.plane.depth + dot(g, corner - c.at) - c.rounding;
         bvec4 blocks = lessThan(z, min(there + around(g), 1.0));
         a.all_block = a.all_block && all(blocks);
+        a.z[i] = z;
         vec4 low = mix(vec4(1.0), z, blocks), high = mix(vec4(-1.0), z, blocks);
         a.nearest = min(a.nearest, min(min(low.x, low.y), min(low.z, low.w)));
         farthest = max(farthest, max(max(high.x, high.y), max(high.z, high.w)));

@@ -10,31 +10,36 @@
 layout(binding = UNIT_SOURCE) uniform sampler2DArray answers; // where the bound is written
 
 const float UNBOUNDED = 60000.0; // of a half float
-const int PLANE_TAPS = 16;
+const int SURFACE_TAPS = 16, HALVINGS = 6;
 
-// Light that the plane of four texels around the receiver leaves: a point of the light is hidden
-// when the map shows that plane where the way to the point crosses it.
-float past_plane(Surface s, Contact c, ReceiverPlane plane, vec2 q, vec2 texel, vec2 size)
+// Light that the surface in the map leaves, of which it is known that it lies before the receiver's
+// own texel: a point of the light is hidden when the way to it meets what the map shows there. That
+// is sought on the plane of the texels around the receiver, and by halving the way up to it.
+float past_surface(
+    Surface s, Contact c, ReceiverPlane plane, Around a, vec2 q, vec2 texel, float answer)
 {
     vec2 base = floor(c.at);
     Caster caster = Caster(vec2(0.0), 0.0, 0.0, -1.0);
     for (int i = 0; i < 4; i++) {
         vec2 corner = base + vec2(i & 1, i >> 1);
-        add_caster(c, corner, textureGather(shadow_map, corner / size), caster);
+        add_caster(c, corner, a.z[i], caster);
     }
     float before = c.plane.depth - caster.depth;
     // A point of the light at e has its image at e * scale * (depth of the receiver - depth there).
     vec2 scale = light_filter_extent(light_linear(caster.depth), s.p.z),
          slope = caster.slope / texel;
     bool found = caster.distance >= 0.0 && before > c.rounding;
-    // In a penumbra the light's corners mostly tell.
-    int count = found ? 4 : 0;
+    // In a penumbra the light's corners mostly tell, or points of its rim, between which less than
+    // a fiftieth of a disk can be seen; what would lower no answer is not counted on.
+    int rim = light_shape == SHAPE_DISK ? 8 : 4, count = found ? rim : 0;
     float left = 0.0, all = 0.0;
-    Taps taps = taps_begin(PLANE_TAPS, vec2(0.5));
+    Taps taps = taps_begin(SURFACE_TAPS, vec2(0.5));
     for (int i = 0; i < count; i++) {
-        bool corner = i < 4;
-        vec2 e = corner ? vec2((i & 1) * 2 - 1, (i & 2) - 1) : taps_next(taps);
-        e *= corner && light_shape == SHAPE_DISK ? 0.70710678 : 1.0;
+        float angle = 0.78539816 * float(i);
+        vec2 e = light_shape == SHAPE_DISK ? vec2(cos(angle), sin(angle))
+                                           : vec2((i & 1) * 2 - 1, (i & 2) - 1);
+        if (i >= rim)
+            e = taps_next(taps);
         float closing = 1.0 + dot(slope, scale * e) / before;
         vec2 image = scale * e / max(closing, 1e-3);
         vec2 texels = floor(c.at + image / texel) + 0.5 - c.at;
@@ -43,12 +48,25 @@ float past_plane(Surface s, Contact c, ReceiverPlane plane, vec2 q, vec2 texel, 
         float z = texture(shadow_map, light_uv(q + image)).r;
         float near = 0.25 * (there - shield);
         bool shown = closing > 1e-3 && abs(z - shield) < max(near, c.rounding);
+        // The way enters from below what the map shows, and ends above it or beyond the plane.
+        float low = 0.0, high = closing > 1e-3 ? 1.0 / closing : 0.0;
+        int halvings = shown || high <= 0.0 || z < shield ? 0 : HALVINGS;
+        for (int k = 0; k < halvings; k++) {
+            float middle = 0.5 * (low + high), depth = c.plane.depth - middle * before;
+            z = texture(shadow_map, light_uv(q + middle * scale * e)).r;
+            shown = abs(z - depth) < max(0.1 * middle * before, c.rounding);
+            low = z < depth ? middle : low;
+            high = z < depth ? high : middle;
+            halvings = shown ? 0 : halvings;
+        }
         bool above = horizon_height(s.p, s.n, e) > 0.0;
         left += above && !shown ? 1.0 : 0.0;
         all += above ? 1.0 : 0.0;
-        count = i == 3 && left < 2.0 ? 4 + PLANE_TAPS : count;
+        int points = rim + SURFACE_TAPS;
+        bool enough = 2.0 * left >= answer * float(points) || (i < rim && left >= 0.5 * float(rim));
+        count = enough ? 0 : i == rim - 1 ? points : count;
     }
-    return count > 4 ? min(2.0 * left / max(all, 1.0), 1.0) : 1.0;
+    return count > rim ? min(2.0 * left / max(all, 1.0), 1.0) : 1.0;
 }
 
 vec4 visibility(Surface s)
@@ -88,11 +106,10 @@ vec4 visibility(Surface s)
             most = 0.0;
     }
 #endif
-    int planes = a.all_block && most > 0.0 ? 1 : 0;
-    planes = bound.kind.x == BOUND_LIGHT || bound.kind.x == BOUND_PLANE ? planes : 0;
-    c.reach = planes > 0 ? 1e6 : c.reach;
-    for (int i = 0; i < planes; i++)
-        most = min(most, past_plane(s, c, plane, q, texel, size));
+    int follow = bound.kind.x >= BOUND_LIGHT && a.all_block && most > 0.0 ? 1 : 0;
+    c.reach = follow > 0 ? 1e6 : c.reach;
+    for (int i = 0; i < follow; i++)
+        most = min(most, past_surface(s, c, plane, a, q, texel, answer));
     if (light.textured != 0 && most > 0.0)
         most = 1.0; // what is left has its own colours
     return most < 1.0 ? scalar_visibility(most) : vec4(UNBOUNDED);

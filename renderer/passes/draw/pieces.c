@@ -5,7 +5,7 @@
 
 #define PIXELS_ON_GPU (1u << 24)
 #define FIRST_PIXELS (1u << 12)
-#define MOST_GROWTH 4.0
+#define MOST_GROWTH 2.0
 /* Of a software rasteriser's tiles; where a row of these takes too long, of a classifier's. */
 #define TILE 64
 #define LOW_ROWS 16
@@ -40,6 +40,8 @@ static void cut(struct pass_pieces *p, double pixels)
     }
     double columns = fmin(fmax(pixels / p->rows, TILE), 1 << 20);
     p->columns = at_most((uint32_t)columns / TILE * TILE, across);
+    if (p->columns >= 4 * TILE && across - p->columns < TILE)
+        p->columns = across;
 }
 
 void pass_pieces_begin(struct technique_ctx *ctx, struct pass_pieces *pieces, uint32_t width,

@@ -11,7 +11,8 @@
 #define WORK_ON_GPU (1ull << 35)
 /* Of unlike pieces, and not everything that a pass draws costs the same, the slowest counts, and is forgotten
  * slowly. */
-#define REMEMBERED 0.9
+#define REMEMBERED 0.97
+#define NEIGHBOURS 16 /* places where a kind's speed may be */
 
 /* Waits until what was handed over before the last call is done, so that no more than two pieces are
  * ever under way: elsewhere than on a CPU, time passes on the device. */
@@ -98,10 +99,16 @@ static uint32_t whole_rows(double rows)
 
 struct technique_speed *pass_speed(struct technique_ctx *ctx, uint64_t kind)
 {
-    struct technique_speed *speed = &ctx->speeds[kind % TECHNIQUE_SPEEDS];
-    if (speed->kind != kind)
-        *speed = (struct technique_speed){.kind = kind};
-    return speed;
+    struct technique_speed *first = &ctx->speeds[kind % TECHNIQUE_SPEEDS], *free = NULL;
+    for (uint32_t i = 0; i < NEIGHBOURS; i++) {
+        struct technique_speed *speed = &ctx->speeds[(kind + i) % TECHNIQUE_SPEEDS];
+        if (speed->kind == kind)
+            return speed;
+        free = !free && !speed->kind ? speed : free;
+    }
+    free = free ? free : first;
+    *free = (struct technique_speed){.kind = kind};
+    return free;
 }
 
 static void begin_piece(struct pass_bands *bands)

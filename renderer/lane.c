@@ -1,6 +1,7 @@
 #include "renderer/lane.h"
 #include "protocol/memory.h"
 #include "renderer/passes/draw/passes.h"
+#include "renderer/passes/draw/turn.h"
 #include "renderer/passes/map/shadow_cache.h"
 #include <stdlib.h>
 #include <string.h>
@@ -60,7 +61,8 @@ void lane_finish(struct lane *lane)
 static void run(void *context)
 {
     struct lane *lane = context;
-    lane->ok = frame_render(&lane->job, lane->frame, lane->result, &lane->error);
+    lane->ok = frame_render(&lane->job, lane->frame, lane->result, &lane->error) &&
+               pass_fits(&lane->ctx, &lane->error);
 }
 
 void lane_begin(struct lane *lane, struct gl_account *account, struct pen_frame *frame,

@@ -315,7 +315,10 @@ bool pen_render_advance(struct pen_render *render, double ms)
     if (r->ctx.software && r->advanced != render)
         gl_wait(); /* what another has under way would be taken for this one's */
     r->advanced = render;
-    return lane_advance(&render->lane, ms);
+    r->residency.drawing = &render->share;
+    bool ended = lane_advance(&render->lane, ms);
+    r->residency.drawing = NULL;
+    return ended;
 }
 
 struct pen_place pen_render_place(const struct pen_render *render)

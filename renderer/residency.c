@@ -6,6 +6,7 @@
 #include <string.h>
 
 #define SESSION_IDLE_MS 60e3
+#define MOST_ABOVE (32u << 20) /* the budget: programs and the like, which cannot be refused */
 #define OWN_PROGRAM_BYTES (32u << 20) /* of programs that the budget does not count */
 
 struct scene *residency_find(const struct residency *r, const uint8_t id[PEN_ID_BYTES])
@@ -197,19 +198,34 @@ void residency_drop(struct residency *r, const uint8_t id[PEN_ID_BYTES])
         }
 }
 
-static void room_for_more(void *owner, uint64_t bytes)
+/* A frame that has all to itself and does not fit is to end (passes/draw/turn.h). */
+static bool room_for_frame(struct residency *r, uint64_t bytes)
 {
-    residency_make_room(owner, bytes, NULL);
+    if (residency_make_room(r, bytes, NULL) || !r->drawing)
+        return true;
+    uint64_t needed = residency_claimed(r) + bytes;
+    for (uint32_t i = 0; i < r->share_count; i++)
+        if (r->shares[i]->lane->busy && r->shares[i] != r->drawing)
+            return true;
+    struct technique_turns *turns = &r->drawing->lane->ctx.turns;
+    if (needed <= r->budget + MOST_ABOVE || turns->held)
+        return true;
+    turns->needed_bytes = needed;
+    return false;
+}
+
+static bool room_for_more(void *owner, uint64_t bytes)
+{
+    return room_for_frame(owner, bytes);
 }
 
 /* What was expected of a render is claimed already. */
-static void room_for_targets(void *owner, uint64_t bytes)
+static bool room_for_targets(void *owner, uint64_t bytes)
 {
     struct residency_share *share = owner;
     uint64_t need = share->lane->busy ? share->need : 0, have = share->targets.bytes;
     uint64_t expected = need > have ? need - have : 0;
-    if (bytes > expected)
-        residency_make_room(share->residency, bytes - expected, NULL);
+    return bytes <= expected || room_for_frame(share->residency, bytes - expected);
 }
 
 void residency_start(struct residency *r, struct technique_ctx *ctx, uint64_t budget,

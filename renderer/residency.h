@@ -21,6 +21,7 @@ struct residency {
     uint32_t share_count;
     struct scene *scenes[MOST_SCENES]; /* emission images too: scenes without geometry */
     uint32_t scene_count;
+    struct residency_share *drawing; /* whose frame is going on, if any */
     struct gl_account loading; /* images of a scene that is being loaded, and of those that are */
     uint64_t loaded;           /* the part of it that scenes count */
     struct emission_cache *emissions;

@@ -47,7 +47,8 @@ struct technique_turns {
     bool held;    /* what is under way must not be interrupted */
     GLsync fence; /* of the last piece but one */
     struct technique_piece under_way;
-    double away_ms; /* between turns */
+    double away_ms;        /* between turns */
+    uint64_t needed_bytes; /* what did not fit the budget came to, with all the rest; 0: it fits */
 };
 
 /* What a software rasteriser takes for a kind of work. */

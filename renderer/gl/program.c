@@ -37,7 +37,7 @@ struct entry {
 struct gl_programs {
     uint32_t most;
     uint64_t most_bytes;
-    void (*make_room)(void *owner, uint64_t bytes);
+    bool (*make_room)(void *owner, uint64_t bytes);
     void *owner;
     struct pen_program_counts counts;
     struct entry *entries; /* counts.kept of them */
@@ -399,7 +399,7 @@ struct pen_program_counts gl_programs_counts(const struct gl_programs *programs)
 }
 
 struct gl_programs *gl_programs_create(
-    uint32_t most, uint64_t most_bytes, void (*make_room)(void *owner, uint64_t bytes), void *owner)
+    uint32_t most, uint64_t most_bytes, bool (*make_room)(void *owner, uint64_t bytes), void *owner)
 {
     struct gl_programs *programs = pen_alloc_zero(1, sizeof *programs);
     programs->most = most ? most : MOST_PROGRAMS;

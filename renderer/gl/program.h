@@ -24,7 +24,7 @@ struct gl_program_desc {
 /* Keeps at most so many programs of so many bytes from frame to frame; 0: 256 and 512 MiB. make_room
  * is called when there is one more; NULL: nobody is. */
 struct gl_programs *gl_programs_create(uint32_t most, uint64_t most_bytes,
-    void (*make_room)(void *owner, uint64_t more_bytes), void *owner);
+    bool (*make_room)(void *owner, uint64_t more_bytes), void *owner);
 void gl_programs_destroy(struct gl_programs *programs);
 
 /* The program, assembled and compiled on first use; owned by the cache, which keeps it at least

@@ -11,6 +11,11 @@ struct gl_account *gl_textures_charge(struct gl_account *account)
     return before;
 }
 
+bool gl_textures_make_room(uint64_t bytes)
+{
+    return !charged || !charged->make_room || charged->make_room(charged->owner, bytes);
+}
+
 void gl_texture_release_account(struct gl_texture *texture)
 {
     if (texture->account)
@@ -18,15 +23,14 @@ void gl_texture_release_account(struct gl_texture *texture)
     texture->account = NULL;
 }
 
-/* Before the driver takes the memory, since then it is too late to make room. */
-static void charge(struct gl_texture *texture)
+static bool charge(struct gl_texture *texture)
 {
+    if (!gl_textures_make_room(texture->bytes))
+        return false;
     texture->account = charged;
-    if (!charged)
-        return;
-    if (charged->make_room)
-        charged->make_room(charged->owner, texture->bytes);
-    charged->bytes += texture->bytes;
+    if (charged)
+        charged->bytes += texture->bytes;
+    return true;
 }
 
 static uint32_t texel_bytes(GLenum format)
@@ -69,7 +73,11 @@ struct gl_texture gl_texture_create(
         uint64_t lw = width >> l ? width >> l : 1, lh = height >> l ? height >> l : 1;
         t.bytes += lw * lh * (layers ? layers : 1) * texel_bytes(format);
     }
-    charge(&t);
+    if (!charge(&t)) {
+        t.width = t.height = width = height = t.levels = 1;
+        t.layers = layers = layers ? 1 : 0;
+        t.bytes = texel_bytes(format);
+    }
     gl.CreateTextures(t.target, 1, &t.name);
     GLsizei n = (GLsizei)t.levels, w = (GLsizei)width, h = (GLsizei)height;
     if (layers)
@@ -93,7 +101,10 @@ struct gl_texture gl_texture_create_samples(
         .height = height,
         .levels = 1,
         .bytes = (uint64_t)width * height * samples * texel_bytes(format)};
-    charge(&t);
+    if (!charge(&t)) {
+        t.width = t.height = width = height = 1;
+        t.bytes = (uint64_t)samples * texel_bytes(format);
+    }
     gl.CreateTextures(t.target, 1, &t.name);
     gl.TextureStorage2DMultisample(
         t.name, (GLsizei)samples, format, (GLsizei)width, (GLsizei)height, GL_TRUE);

@@ -14,13 +14,16 @@ struct gl_texture {
 /* Who is charged for what is made. */
 struct gl_account {
     uint64_t bytes;
-    /* Called before so many more are taken; NULL: nobody is. */
-    void (*make_room)(void *owner, uint64_t bytes);
+    /* Called before so many more are taken; NULL: nobody is. False: they must not be, and a texture
+     * of one texel is made instead. */
+    bool (*make_room)(void *owner, uint64_t bytes);
     void *owner;
 };
 /* From now on new textures and targets are charged to *account, which outlives them; NULL: to none.
  * Returns what was there before. */
 struct gl_account *gl_textures_charge(struct gl_account *account);
+/* Asks whom new textures are charged to for room, as one of so many bytes does. */
+bool gl_textures_make_room(uint64_t bytes);
 /* From now on its bytes are counted elsewhere. */
 void gl_texture_release_account(struct gl_texture *texture);
 

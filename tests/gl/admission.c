@@ -244,6 +244,26 @@ static void check_lights_within_a_frame(void)
     }
 }
 
+/* A map that cannot fit is refused with the numbers, and the next picture is as before. */
+static void check_maps_too_large(void)
+{
+    struct pen_error error = {0};
+    const uint64_t budget = 160u << 20;
+    struct pen_renderer *r = fixture_renderer(PEN_DEVICE_AUTO, budget, &error);
+    struct pen_request small, large;
+    struct pen_result result;
+    struct pen_frame frame;
+    make_request_of(&small, IN_USE, 1024);
+    make_request_of(&large, IN_USE, 8192); /* 256 MiB of depth alone */
+    CHECK(admit(r, &small, IN_USE, false, &error) == PEN_ADMITTED);
+    uint64_t before = fixture_render(r, &small, &result);
+    CHECK(!pen_renderer_render(r, &large, &frame, &result, &error));
+    CHECK(error.code == PEN_TOO_BIG && strstr(error.message, "160 MiB are allowed"));
+    CHECK(fixture_render(r, &small, &result) == before);
+    CHECK(pen_renderer_gpu_bytes(r) <= budget);
+    pen_renderer_destroy(r);
+}
+
 int main(void)
 {
     struct pen_error error;
@@ -258,6 +278,7 @@ int main(void)
     check_pictures(blob);
     check_maps_within_a_frame();
     check_lights_within_a_frame();
+    check_maps_too_large();
     for (uint32_t i = 0; i < BLOBS; i++)
         close(blobs.fds[i]);
     CHECK_DONE();

@@ -104,6 +104,8 @@ bool pass_room(struct technique_ctx *ctx, uint64_t bytes, struct pen_error *erro
 {
     if (!ctx->software || pass_turn_is_whole(ctx) || bytes < 2 * ROOM_STEP)
         return true;
+    if (!gl_textures_make_room(bytes)) /* what is touched here is there beside what is held */
+        return pass_fits(ctx, error);
     char *room = mmap(
         NULL, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
     if (room == MAP_FAILED)

@@ -163,6 +163,8 @@ static void add_own(struct drawing *d, GLuint unit, GLuint name, enum gl_sampler
 
 bool pass_screen(struct technique_run *run, const struct pass_screen *pass, struct pen_error *error)
 {
+    if (!pass_fits(run->ctx, error))
+        return false;
     struct technique_ctx *ctx = run->ctx;
     char defines[1024];
     bool fade = !pass->framebuffer && !run->technique->counts_horizon;
@@ -206,6 +208,8 @@ bool pass_screen(struct technique_run *run, const struct pass_screen *pass, stru
 
 bool pass_fill(struct technique_ctx *ctx, const struct pass_fill *pass, struct pen_error *error)
 {
+    if (!pass_fits(ctx, error))
+        return false;
     struct gl_program_desc desc = {.vertex = pass->tiles ? "tiles.vert" : "screen.vert",
         .fragment = pass->fragment,
         .defines = pass->defines,

@@ -58,12 +58,25 @@ static bool is_over(struct technique_ctx *ctx, double now)
            (ctx->is_called && ctx->is_called(ctx->call_context));
 }
 
+bool pass_fits(const struct technique_ctx *ctx, struct pen_error *error)
+{
+    const struct technique_turns *turns = &ctx->turns;
+    return !turns->needed_bytes || turns->held ||
+           pen_fail(error, PEN_TOO_BIG, "",
+               "With this method's maps the image needs more than %.0f MiB of GPU memory; %.0f MiB "
+               "are allowed. Ask for smaller or fewer maps (map_size), or have --gpu-memory "
+               "raised.",
+               (double)turns->needed_bytes / (1 << 20), (double)ctx->gpu_memory / (1 << 20));
+}
+
 bool pass_turn(struct technique_ctx *ctx, struct pen_error *error)
 {
     struct technique_turns *turns = &ctx->turns;
     turns->stopped |= !turns->held && is_time_up(turns);
     if (turns->stopped)
         return pen_fail(error, PEN_DEADLINE, "/deadline_ms", "The image's time is up.");
+    if (!pass_fits(ctx, error))
+        return false;
     if (pass_turn_is_whole(ctx))
         return true;
     follow_device(ctx);

@@ -7,6 +7,9 @@
  * differs, and of GL's state only the blocks of frame, light and parameters are as before. False,
  * with the error filled, when the frame is not wanted any more. */
 bool pass_turn(struct technique_ctx *ctx, struct pen_error *error);
+/* Before anything is drawn into a new texture, and by pass_turn: false, with PEN_TOO_BIG, when there
+ * was no room for it. */
+bool pass_fits(const struct technique_ctx *ctx, struct pen_error *error);
 /* As pass_turn, within a pass that is being timed: waits for what was drawn so far. */
 bool pass_turn_inside(struct technique_ctx *ctx, struct pen_error *error);
 /* Nobody comes in between now: nothing need be cut. */

@@ -177,9 +177,12 @@ bool pass_sample_maps(struct technique_run *run, const struct sample_point *poin
     }
     static const struct pass_targets scratch = {1};
     struct gl_target *array = pass_targets(run->ctx, &scratch);
-    if ((array->texture.width != size &&
-            !pass_room(run->ctx, map_bytes(size, SAMPLE_MAP_BATCH), error)) ||
-        (gl_target_fit(array, GL_DEPTH_COMPONENT32F, size, size, SAMPLE_MAP_BATCH, 1) &&
+    if (array->texture.width != size) {
+        gl_target_destroy(array); /* not the old one and the new one together */
+        if (!pass_room(run->ctx, map_bytes(size, SAMPLE_MAP_BATCH), error))
+            return false;
+    }
+    if ((gl_target_fit(array, GL_DEPTH_COMPONENT32F, size, size, SAMPLE_MAP_BATCH, 1) &&
             !pass_turn(run->ctx, error)))
         return false;
     *maps = &array->texture;

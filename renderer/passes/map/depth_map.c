@@ -63,6 +63,8 @@ static bool draw(
 {
     static const float one[4] = {1};
     const char *peel = d->layer_before ? "#define PEEL\n" : NULL;
+    if (!pass_fits(run->ctx, error))
+        return false;
     /* Light space looks along +z, which mirrors the image: front faces come out clockwise. */
     d->pass.front_is_clockwise = true;
     d->pass.opaque = program(run->ctx, peel, error);

@@ -31,7 +31,7 @@ struct shadow_cache {
 };
 
 struct shadow_cache *shadow_cache_create(
-    void (*make_room)(void *owner, uint64_t bytes), void *owner)
+    bool (*make_room)(void *owner, uint64_t bytes), void *owner)
 {
     struct shadow_cache *cache = pen_alloc_zero(1, sizeof *cache);
     cache->building = (struct gl_account){0, make_room, owner};

@@ -21,7 +21,7 @@ struct shadow_input {
 
 /* make_room is called before an input's textures take so many bytes. */
 struct shadow_cache *shadow_cache_create(
-    void (*make_room)(void *owner, uint64_t bytes), void *owner);
+    bool (*make_room)(void *owner, uint64_t bytes), void *owner);
 void shadow_cache_destroy(struct shadow_cache *cache);
 
 typedef bool (*shadow_build)(struct technique_run *run, const struct shadow_key *key,

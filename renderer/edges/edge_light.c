@@ -329,7 +329,7 @@ static four match(const struct plane *plane, four depths, float across, float do
     four miss = plane->at - plane->across * across - plane->down * down - depths;
     miss = size(miss + plane->across * cover_across + plane->down * cover_down);
     four rise =
-        fabsf(plane->across) + fabsf(plane->down) + 1e-20f + 1e-3f * larger(depths, all(plane->at));
+        fabsf(plane->across) + fabsf(plane->down) + 1e-20f + 2e-3f * larger(depths, all(plane->at));
     return rise / (miss + 0.1f * rise);
 }
 
@@ -350,7 +350,7 @@ static void blend_pixel(struct around *a, uint32_t x, uint32_t y, size_t slot)
     four front = e->layered ? larger(solid, e->front.places[slot]) : solid;
     const struct look *own = look_at(a, x, y);
     four weights = match_both(e, own, solid, front, 0, 0);
-    four open = 4 - 0.6f * weights; /* 0 where the pixel's own plane explains the place */
+    four open = 4 - 0.42f * weights; /* 0 where the pixel's own plane explains the place */
     open = choose(open < 1.0f, larger(open, all(0)), all(1));
     if (!any(open > 0.0f))
         return;

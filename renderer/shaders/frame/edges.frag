@@ -100,7 +100,7 @@ vec4 match(vec3 plane, vec4 depths, vec2 offset)
 {
     vec4 miss = plane.x - dot(plane.yz, offset) - depths;
     miss = abs(miss + plane.y * edge.across + plane.z * edge.down);
-    vec4 rise = abs(plane.y) + abs(plane.z) + 1e-3 * max(depths, plane.x) + 1e-20;
+    vec4 rise = abs(plane.y) + abs(plane.z) + 2e-3 * max(depths, plane.x) + 1e-20;
     vec4 background = mix(vec4(1e-9), vec4(10.0), equal(depths, vec4(0.0)));
     return plane.x == 0.0 ? background : rise / (miss + 0.1 * rise);
 }
@@ -137,7 +137,7 @@ void main()
 #endif
         // 0 where the pixel's own plane explains the place.
         own = match_both(planes_at(pixel, right, up), depths, front, vec2(0.0));
-        open = clamp(4.0 - 0.6 * own, 0.0, 1.0);
+        open = clamp(4.0 - 0.42 * own, 0.0, 1.0);
         around = any(greaterThan(open, vec4(0.0))) ? 8 : 0;
     }
     vec4 sums[EDGE_PLACES], weights = own, own_light = light_of(texelFetch(picture, pixel, 0));

@@ -196,6 +196,39 @@ static void check_blended(void)
     CHECK(d.rmse < 0.008 && fabs(d.mean) < 0.002 && d.pixels > 10000);
 }
 
+/* A penumbra that ends at a ridge, beyond which the surface is turned from the sun by ten degrees:
+ * nothing of what is lit before it gets there. */
+static void check_ridge(void)
+{
+    static const struct quad quads[] = {
+        {{-1, 0, 0}, {1, 0, 0}, {0, 0, -1}, {1, 1, 1, 1}},
+        {{0.94f, -0.342f, 0}, {0.94f, -0.342f, 0}, {0, 0, -1}, {1, 1, 1, 1}},
+        {{-0.5f, 0.08f, 0}, {0.05f, 0, 0}, {0, 0, -0.5f}, {1, 1, 1, 1}},
+    };
+    uint8_t id[PEN_ID_BYTES];
+    struct shot shot;
+    uint32_t counts[3] = {0};
+    load_quads(quads, 3, false, id);
+    harness_shot(id,
+        METHOD "width=256&height=256&ground=off&camera.eye=0,1.5,0&camera.target=0,0,0"
+               "&camera.up=0,0,-1&camera.fov_y_deg=60&light.type=sun&light.position=-1,0.1763,0"
+               "&light.target=0,0,0&light.angular_diameter_deg=10",
+        &shot);
+    for (uint32_t i = 0; i < shot.width * shot.height; i++) {
+        const float *p = shot.position + 4 * i;
+        float a = shot.visibility[4 * i + 3];
+        if (p[0] > 0.02f && p[1] < 0) {
+            CHECK(a == 0);
+            counts[0]++;
+        } else if (p[0] < -0.01f && fabsf(p[1]) < 1e-3f && fabsf(p[2]) < 0.4f) {
+            counts[1]++;
+            counts[2] += a > 0.05f && a < 0.95f;
+        }
+    }
+    CHECK(counts[0] > 10000 && counts[1] > 5000 && counts[2] > 500);
+    harness_shot_finish(&shot);
+}
+
 /* The same request, the same bytes, whatever was drawn before it; pictures smaller than a block; and
  * another seed is another picture. */
 static void check_requests(void)
@@ -251,6 +284,7 @@ int main(void)
     check_more_rays();
     check_points();
     check_blended();
+    check_ridge();
     check_requests();
     scene(PEN_GENERATED_HALF_PLANE, id);
     textured_check_t5(id, METHOD, &t, 0.03);

@@ -211,11 +211,11 @@ static void sample_block(struct denoise *d, uint32_t x0, uint32_t y0)
         if (x >= width || y >= height)
             continue;
         d->above[pixel] = (uint8_t)(same ? d->samples : 0);
-        d->fade[pixel] = b.is[lane] && !same ? horizon_fade(d, &b.packet, lane) : 1;
-        if (same)
-            continue;
+        d->fade[pixel] = b.is[lane] ? horizon_fade(d, &b.packet, lane) : 1;
         /* What is turned from the light says nothing of its neighbours: as what is no receiver. */
         set_normal(d, pixel, b.packet.active[lane] ? b.receivers[lane].normal : zero, 1);
+        if (same)
+            continue;
         set_value(d, pixel, b.is[lane] ? zero : d->mean_emission, b.is[lane] ? 0 : 1);
         if (!b.is[lane])
             continue;

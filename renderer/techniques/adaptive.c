@@ -106,7 +106,7 @@ static bool record(struct technique_run *run, struct pen_error *error)
     struct classify_desc classes = {.map_size = params->map_size,
         .margin_texels = 1.5f * params->min_filter + 1,
         .umbra = true,
-        .bound = BOUND_SURFACE};
+        .bound = BOUND_PLANE};
     if (!pass_classify(run, &classes, &pass.tiles, error))
         return false;
     struct pass_texture pyramid = {UNIT_MIN_MAX, min_max->textures[0].name, GL_SAMPLE_NEAREST};

@@ -38,7 +38,7 @@ static bool record(struct technique_run *run, struct pen_error *error)
     struct classify_desc classes = {.map_size = params->map_size,
         .margin_texels = params->min_filter + 1,
         .umbra = true,
-        .bound = BOUND_SURFACE};
+        .bound = BOUND_PLANE};
     const struct gl_texture *tiles;
     if (!pass_classify(run, &classes, &tiles, error))
         return false;

@@ -165,7 +165,7 @@ class Contact(unittest.TestCase):
         view = {"camera": {"eye": [1.5, 1.5, 1.5], "target": [-1.5, 0.8, -1.5], "fov_y_deg": 75}}
         self.check_dark(scene, {**view, "lights": [{**SUN, "position": [5, 7, 3]}]}, self.methods)
         self.check_dark(scene, {**view, "lights": [rect(4, 5, 3)]},
-                        ("pcss", "mssm", "accumulation", "backprojection", "bitmask"), 10, 12)
+                        ("pcss", "accumulation", "backprojection", "bitmask"), 10, 12)
 
     def test_box_keeps_its_shadow_on_a_wide_ground(self):
         points, normals, indices = box((1, 1, 1), (0, 0.5, 0))

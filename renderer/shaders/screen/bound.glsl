@@ -49,12 +49,14 @@ float past_surface(
         float near = 0.25 * (there - shield);
         bool shown = closing > 1e-3 && abs(z - shield) < max(near, c.rounding);
         // The way enters from below what the map shows, and ends above it or beyond the plane.
-        float low = 0.0, high = closing > 1e-3 ? 1.0 / closing : 0.0;
-        int halvings = shown || high <= 0.0 || z < shield ? 0 : HALVINGS;
+        float low = 0.0, high = closing > 0.25 ? 1.0 / closing : 0.0;
+        int halvings = shown || high <= 0.0 || z < shield ? 0
+                       : bound.kind.x == BOUND_SURFACE    ? HALVINGS
+                                                          : 0;
         for (int k = 0; k < halvings; k++) {
             float middle = 0.5 * (low + high), depth = c.plane.depth - middle * before;
             z = texture(shadow_map, light_uv(q + middle * scale * e)).r;
-            shown = abs(z - depth) < max(0.1 * middle * before, c.rounding);
+            shown = abs(z - depth) < max(0.1 * min(middle, 1.0) * before, c.rounding);
             low = z < depth ? middle : low;
             high = z < depth ? high : middle;
             halvings = shown ? 0 : halvings;

@@ -217,7 +217,7 @@ static void check_ridge(void)
     for (uint32_t i = 0; i < shot.width * shot.height; i++) {
         const float *p = shot.position + 4 * i;
         float a = shot.visibility[4 * i + 3];
-        if (p[0] > 0.02f && p[1] < 0) {
+        if (p[0] > 0 && p[1] < -1e-4f) {
             CHECK(a == 0);
             counts[0]++;
         } else if (p[0] < -0.01f && fabsf(p[1]) < 1e-3f && fabsf(p[2]) < 0.4f) {

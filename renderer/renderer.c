@@ -40,7 +40,7 @@ struct pen_renderer *pen_renderer_create(
         free(r);
         return NULL;
     }
-    r->ctx.software = r->device.software;
+    r->ctx.software = r->device.software && !config->as_gpu;
     r->ctx.is_called = config->is_called;
     r->ctx.call_context = config->call_context;
     r->ctx.speeds = r->speeds;

@@ -16,6 +16,7 @@ struct pen_renderer_config {
     /* Asked between two pieces of work; true ends the turn before its time. NULL: nobody is. */
     bool (*is_called)(void *context);
     void *call_context;
+    bool as_gpu; /* goes the ways that are a GPU's, so that they can be tested without one */
 };
 
 /* Every registered method; usable without a renderer and without a GPU. */

@@ -8,11 +8,13 @@ bool compute_begin(struct technique_ctx *ctx, struct gl_context **context)
     struct pen_error error = {0};
     struct pen_device_config config = {.debug = true};
     struct pen_device_info device;
+    static struct technique_speed speeds[TECHNIQUE_SPEEDS];
     *context = gl_context_create(&config, &device, &error);
     if (!*context) {
         fprintf(stderr, "skipped: %s\n", error.message);
         return false;
     }
+    ctx->speeds = speeds;
     ctx->programs = gl_programs_create(0, 0, NULL, NULL);
     gl_samplers_init(&ctx->samplers);
     ctx->software = device.software;

@@ -2,12 +2,13 @@
 """What a worker holds while it draws everything there is with a small budget.
 
     memory.py [--bin DIR] [--budget 512] [--minutes 10] [--limit 700] [--scenes DIR] [--seed 1]
+              [--share 0.25]
 
 Every method in random order on 24 scenes (the .glb files of --scenes, else made by `penumbra
-generate`), with random sizes and with random values of its parameters, one after the other. Prints
-every new peak of the worker's resident memory with the request that made it, counts the answers by
-status, and exits 1 when the peak is above --limit (MiB), or when an answer is neither a picture nor
-a refusal that says why (413, 422, 504).
+generate`), with random sizes and with random values of a --share of its parameters, one after the
+other. Prints every new peak of the worker's resident memory with the request that made it, counts
+the answers by status, and exits 1 when the peak is above --limit (MiB), or when an answer is neither
+a picture nor a refusal that says why (413, 422, 504).
 """
 import argparse
 import collections
@@ -40,10 +41,10 @@ def some(row, rnd):
     return value if row["type"] == "float" else int(value)
 
 
-def request(technique, rnd):
+def request(technique, share, rnd):
     width, height = rnd.choice(SIZES)
     params = {row["name"]: some(row, rnd) for row in technique["params"]
-              if row["components"] == 1 and rnd.random() < 0.25}
+              if row["components"] == 1 and rnd.random() < share}
     return {"width": width, "height": height, "deadline_ms": 8000,
             "technique": {"name": technique["name"], "params": params}}
 
@@ -71,6 +72,7 @@ def main():
     parser.add_argument("--minutes", type=float, default=10)
     parser.add_argument("--limit", type=float, default=700, help="most of resident memory, MiB")
     parser.add_argument("--scenes", help="a folder of .glb files")
+    parser.add_argument("--share", type=float, default=0.25, help="of parameters off their default")
     parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args()
     os.environ["PENUMBRA_BIN"] = options.bin
@@ -93,7 +95,7 @@ def main():
     counts = collections.Counter()
     while time.monotonic() < end:
         name, scene = rnd.choice(scenes)
-        body = request(rnd.choice(techniques), rnd)
+        body = request(rnd.choice(techniques), options.share, rnd)
         answer = daemon.render(scene, body, timeout=120)
         counts[answer.status] += 1
         if answer.status not in FINE:

@@ -104,7 +104,8 @@ bool residency_is_any_busy(const struct residency *r)
 }
 
 /* Frees something that can be made again, the cheapest first: sums that somebody may ask more of,
- * targets that nobody draws into, shadow inputs, sessions, emission textures, scenes, hierarchies for rays. False: all that is left is in use. */
+ * targets that nobody draws into, shadow inputs, sessions, emission textures, scenes, hierarchies for
+ * rays. False: all that is left is in use. */
 static bool evict(struct residency *r, uint64_t bytes, const struct scene *keep)
 {
     uint64_t least = UINT64_MAX, before = kept_sums_store_bytes(r->ctx->kept_sums);
@@ -198,15 +199,26 @@ void residency_drop(struct residency *r, const uint8_t id[PEN_ID_BYTES])
         }
 }
 
-/* A frame that has all to itself and does not fit is to end (passes/draw/turn.h). */
+/* What will be free when all other frames have ended: their targets, inputs and scenes. */
+static uint64_t bytes_beside(const struct residency *r, const struct residency_share *own)
+{
+    uint64_t bytes = shadow_cache_bytes_beside(r->ctx->shadows, own->lane->ctx.lane);
+    for (uint32_t i = 0; i < r->share_count; i++)
+        if (r->shares[i] != own && r->shares[i]->lane->busy)
+            bytes += r->shares[i]->need > r->shares[i]->targets.bytes ? r->shares[i]->need
+                                                                      : r->shares[i]->targets.bytes;
+    for (uint32_t i = 0; i < r->scene_count; i++)
+        if (r->scenes[i] != own->lane->job.scene)
+            bytes += r->scenes[i]->bytes;
+    return bytes;
+}
+
+/* A frame that would not fit if it had all to itself is to end (passes/draw/turn.h). */
 static bool room_for_frame(struct residency *r, uint64_t bytes)
 {
     if (residency_make_room(r, bytes, NULL) || !r->drawing)
         return true;
-    uint64_t needed = residency_claimed(r) + bytes;
-    for (uint32_t i = 0; i < r->share_count; i++)
-        if (r->shares[i]->lane->busy && r->shares[i] != r->drawing)
-            return true;
+    uint64_t needed = residency_claimed(r) + bytes - bytes_beside(r, r->drawing);
     struct technique_turns *turns = &r->drawing->lane->ctx.turns;
     if (needed <= r->budget + MOST_ABOVE || turns->held)
         return true;
@@ -217,6 +229,12 @@ static bool room_for_frame(struct residency *r, uint64_t bytes)
 static bool room_for_more(void *owner, uint64_t bytes)
 {
     return room_for_frame(owner, bytes);
+}
+
+/* A program is there when it asks, and is not refused. */
+static bool room_for_program(void *owner, uint64_t bytes)
+{
+    return residency_make_room(owner, bytes, NULL);
 }
 
 /* What was expected of a render is claimed already. */
@@ -235,7 +253,7 @@ void residency_start(struct residency *r, struct technique_ctx *ctx, uint64_t bu
     ctx->gpu_memory = budget;
     ctx->shadow_memory = budget / 4;
     ctx->programs = gl_programs_create(
-        most_programs, ctx->software ? OWN_PROGRAM_BYTES + budget / 4 : 0, room_for_more, r);
+        most_programs, ctx->software ? OWN_PROGRAM_BYTES + budget / 4 : 0, room_for_program, r);
     ctx->shadows = shadow_cache_create(room_for_more, r);
     ctx->histories =
         history_store_create(budget / 4, session_idle_ms > 0 ? session_idle_ms : SESSION_IDLE_MS);

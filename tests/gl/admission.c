@@ -261,6 +261,12 @@ static void check_maps_too_large(void)
     CHECK(error.code == PEN_TOO_BIG && strstr(error.message, "160 MiB are allowed"));
     CHECK(fixture_render(r, &small, &result) == before);
     CHECK(pen_renderer_gpu_bytes(r) <= budget);
+    /* Nor beside another frame: it would not fit when that has ended. */
+    struct progress other = {0};
+    begin(r, &other, IN_USE);
+    CHECK(!pen_renderer_render(r, &large, &frame, &result, &error) && error.code == PEN_TOO_BIG);
+    CHECK(pen_renderer_gpu_bytes(r) <= budget);
+    end(&other);
     pen_renderer_destroy(r);
 }
 

@@ -124,6 +124,15 @@ uint64_t shadow_cache_bytes(const struct shadow_cache *cache)
     return cache->bytes + cache->building.bytes;
 }
 
+uint64_t shadow_cache_bytes_beside(const struct shadow_cache *cache, uint32_t lane)
+{
+    uint64_t bytes = 0;
+    for (const struct entry *e = cache->entries; e; e = e->next)
+        if (e->lanes && !(e->lanes >> lane & 1))
+            bytes += e->bytes;
+    return bytes;
+}
+
 void shadow_cache_trim(struct shadow_cache *cache, uint64_t bytes)
 {
     while (shadow_cache_bytes(cache) > bytes) {

@@ -36,6 +36,8 @@ const struct shadow_input *shadow_cache_get(struct technique_run *run, const str
 void shadow_cache_mark_built(const struct technique_ctx *ctx);
 
 uint64_t shadow_cache_bytes(const struct shadow_cache *cache);
+/* Of those that only other lanes have got and not released. */
+uint64_t shadow_cache_bytes_beside(const struct shadow_cache *cache, uint32_t lane);
 /* Drops the least recently used inputs that no frame in progress uses until `bytes` or less are
  * held. */
 void shadow_cache_trim(struct shadow_cache *cache, uint64_t bytes);

@@ -47,6 +47,9 @@ struct technique_turns {
     bool held;    /* what is under way must not be interrupted */
     GLsync fence; /* of the last piece but one */
     struct technique_piece under_way;
+    /* Called before and after others have the turn; NULL: nothing goes on that should not then. */
+    void (*away)(void *context, bool is);
+    void *away_context;
     double away_ms;        /* between turns */
     uint64_t needed_bytes; /* what did not fit the budget came to, with all the rest; 0: it fits */
 };

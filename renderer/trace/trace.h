@@ -72,6 +72,11 @@ uint32_t pen_trace_kept_samples(const struct pen_trace_kept *kept); /* NULL: 0 *
 uint64_t pen_trace_kept_bytes(size_t receivers, bool plain);
 void pen_trace_kept_destroy(struct pen_trace_kept *kept); /* NULL is fine */
 
+/* The other threads of a job end what they are at and wait until they are held no more. */
+struct pen_trace_crew {
+    void (*hold)(struct pen_trace_crew *crew, bool held);
+};
+
 enum pen_trace_step { PEN_TRACE_GO_ON, PEN_TRACE_SHOW, PEN_TRACE_STOP };
 
 /* Receivers as a camera's picture has them: pixel (x, y) shows eye + (first + x right + y down) / depth,
@@ -128,6 +133,9 @@ struct pen_trace_job {
      * is the result. NULL: nobody asks. */
     enum pen_trace_step (*step)(void *context, uint32_t done, uint32_t total);
     bool (*show)(void *context);
+    /* Called after it, for what needs the arrays no more: the other threads trace on, but while they
+     * are held. May be NULL. */
+    bool (*shown)(void *context, struct pen_trace_crew *crew);
 };
 
 struct pen_trace_result { /* each array: width * height, or NULL when not wanted */

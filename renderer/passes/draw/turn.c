@@ -84,7 +84,11 @@ bool pass_turn(struct technique_ctx *ctx, struct pen_error *error)
     if (!turns->cancelled && is_over(ctx, now)) {
         turns->used_ms += now - turns->since_ms;
         gl_timer_stop(&ctx->timer);
+        if (turns->away)
+            turns->away(turns->away_context, true);
         gl_fiber_pause(turns->fiber);
+        if (turns->away)
+            turns->away(turns->away_context, false);
         gl_timer_go_on(&ctx->timer);
         turns->number++;
         turns->since_ms = gl_now_ms();

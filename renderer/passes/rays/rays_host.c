@@ -116,13 +116,28 @@ static void write_result(const struct waiting *w)
 
 static bool show(void *context)
 {
+    write_result(context);
+    return true;
+}
+
+static void hold(void *crew, bool away)
+{
+    struct pen_trace_crew *c = crew;
+    c->hold(c, away);
+}
+
+/* Rays are traced on meanwhile, but not while others have the turn. */
+static bool shown(void *context, struct pen_trace_crew *crew)
+{
     struct waiting *w = context;
-    struct gl_timer *timer = &w->run->ctx->timer;
-    gl_timer_end(timer);
-    write_result(w);
+    struct technique_ctx *ctx = w->run->ctx;
+    ctx->turns.away = hold;
+    ctx->turns.away_context = crew;
+    gl_timer_end(&ctx->timer);
     bool settled = ray_host_settles(w->run) || w->job->settle(w->run, w->error);
     bool ok = settled && pass_show(w->run, w->error);
-    gl_timer_begin(timer, PEN_STAGE_TECHNIQUE, "trace");
+    gl_timer_begin(&ctx->timer, PEN_STAGE_TECHNIQUE, "trace");
+    ctx->turns.away = NULL;
     return ok;
 }
 
@@ -193,6 +208,7 @@ bool pass_rays_host(struct technique_run *run, const struct ray_job *job, struct
     if (trace.turn) {
         trace.step = step;
         trace.show = show;
+        trace.shown = shown;
     }
     struct pen_trace_stats stats;
     struct kept_sum *kept = open_kept(run, job);

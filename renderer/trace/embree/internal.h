@@ -146,6 +146,8 @@ struct trace_work {
     /* As pen_trace_job has them; NULL: it is done in one go. */
     bool (*turn)(void *context);
     double turn_ms;
+    /* Called first, while the other threads are at it already; false as from `turn`. May be NULL. */
+    bool (*beside)(void *context, struct pen_trace_crew *crew);
 };
 /* On `threads` threads, the caller's among them, with denormals flushed. Adds their processor time to
  * *cpu_seconds. False: a turn said so, and items are left out. */
@@ -158,6 +160,7 @@ struct trace_pieces {
     uint32_t threads;
     double cpu_seconds; /* so far */
     atomic_bool late;   /* there is no more wanted */
+    bool owes;          /* job->shown is to be called beside the next work */
 };
 /* Calls work(pieces, tile) for all tiles; now and then others come in between when they want to. False:
  * it is late. */

@@ -1,5 +1,6 @@
 /* Threads over numbered items. */
 #include "renderer/trace/embree/internal.h"
+#include "protocol/container.h"
 #include <pthread.h>
 #include <sched.h>
 #include <stdatomic.h>
@@ -11,6 +12,7 @@
 #define MAX_THREADS 256
 
 struct crew {
+    struct pen_trace_crew held_by; /* who shows something meanwhile */
     const struct trace_work *work;
     _Atomic uint32_t next;
     /* The caller's thread is away: whoever has done an item waits until it is back. */
@@ -56,6 +58,11 @@ static void hold(struct crew *crew, bool held)
         pthread_cond_broadcast(&crew->back);
 }
 
+static void hold_all(struct pen_trace_crew *held_by, bool held)
+{
+    hold(container_of(held_by, struct crew, held_by), held);
+}
+
 static void wait_for_leader(struct crew *crew)
 {
     if (!atomic_load_explicit(&crew->held, memory_order_relaxed))
@@ -75,6 +82,16 @@ static bool take_turn(struct crew *crew)
     if (!ok)
         atomic_store(&crew->next, crew->work->count);
     hold(crew, false);
+    return ok;
+}
+
+/* As the caller's thread is elsewhere: not as one that traces. */
+static bool begin(struct crew *crew)
+{
+    const struct trace_work *work = crew->work;
+    bool ok = !work->beside || work->beside(work->context, &crew->held_by);
+    if (!ok)
+        atomic_store(&crew->next, work->count);
     return ok;
 }
 
@@ -108,13 +125,14 @@ static void follow(struct crew *crew)
 static void *run_member(void *argument)
 {
     struct member *member = argument;
+    member->ok = !member->leads || begin(member->crew);
     double start = seconds_of(CLOCK_THREAD_CPUTIME_ID);
 #ifdef __SSE__
     unsigned control = _mm_getcsr();
     _mm_setcsr(control | 0x8040); /* flush denormals: Embree is slow on them */
 #endif
     if (member->leads)
-        member->ok = lead(member->crew);
+        member->ok = member->ok && lead(member->crew);
     else
         follow(member->crew);
 #ifdef __SSE__
@@ -126,7 +144,8 @@ static void *run_member(void *argument)
 
 bool trace_parallel(uint32_t threads, const struct trace_work *work, double *cpu_seconds)
 {
-    struct crew crew = {work, 0, false, PTHREAD_MUTEX_INITIALIZER, PTHREAD_COND_INITIALIZER};
+    struct crew crew = {
+        {hold_all}, work, 0, false, PTHREAD_MUTEX_INITIALIZER, PTHREAD_COND_INITIALIZER};
     struct member members[MAX_THREADS];
     pthread_t handles[MAX_THREADS];
     if (threads > work->count)

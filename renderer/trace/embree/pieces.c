@@ -17,11 +17,20 @@ static bool take_turn(void *context)
     return !atomic_load(&p->late);
 }
 
+static bool show_beside(void *context, struct pen_trace_crew *crew)
+{
+    struct trace_pieces *p = context;
+    if (!p->job->shown(p->job->turn_context, crew))
+        atomic_store(&p->late, true);
+    return !atomic_load(&p->late);
+}
+
 bool trace_in_pieces(
     struct trace_pieces *p, uint32_t tiles, void (*work)(void *context, uint32_t item))
 {
-    const struct trace_work all = {
-        work, p, tiles, p->job->turn ? take_turn : NULL, p->job->turn_ms};
+    const struct trace_work all = {work, p, tiles, p->job->turn ? take_turn : NULL, p->job->turn_ms,
+        p->owes ? show_beside : NULL};
+    p->owes = false;
     trace_parallel(p->threads, &all, &p->cpu_seconds);
     return !atomic_load(&p->late);
 }

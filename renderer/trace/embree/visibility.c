@@ -378,6 +378,7 @@ static bool look_up(struct run *run, uint32_t taken)
     run->enough = step == PEN_TRACE_STOP;
     if (!over_tiles(run, estimate_tile) || (!run->enough && !job->show(job->turn_context)))
         atomic_store(&run->pieces.late, true);
+    run->pieces.owes = !run->enough && job->shown;
     return !atomic_load(&run->pieces.late);
 }
 

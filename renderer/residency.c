@@ -1,4 +1,5 @@
 #include "renderer/residency.h"
+#include "renderer/gl/release.h"
 #include "renderer/passes/draw/kept_sums.h"
 #include "renderer/passes/filter/history.h"
 #include "renderer/passes/map/shadow_cache.h"
@@ -6,7 +7,8 @@
 #include <string.h>
 
 #define SESSION_IDLE_MS 60e3
-#define MOST_ABOVE (32u << 20) /* the budget: programs and the like, which cannot be refused */
+#define MOST_ABOVE (32u << 20)     /* the budget: programs and the like, which cannot be refused */
+#define RELEASED_BYTES (32u << 20) /* deleted: less is not worth the time */
 #define OWN_PROGRAM_BYTES (32u << 20) /* of programs that the budget does not count */
 
 struct scene *residency_find(const struct residency *r, const uint8_t id[PEN_ID_BYTES])
@@ -89,9 +91,11 @@ static void remove_scene(struct residency *r, uint32_t i)
     shadow_cache_drop_scene(r->ctx->shadows, r->scenes[i]);
     emission_cache_drop(r->emissions, r->scenes[i]->id);
     kept_sums_store_drop(r->ctx->kept_sums, r->scenes[i]->id);
-    uint64_t images = r->loading.bytes;
+    uint64_t bytes = r->scenes[i]->bytes, images = r->loading.bytes;
     scene_destroy(r->scenes[i]);
-    r->loaded -= images - r->loading.bytes;
+    images -= r->loading.bytes;
+    r->loaded -= images;
+    gl_deleted_add(bytes - images); /* which have been added */
     r->scenes[i] = r->scenes[--r->scene_count];
 }
 
@@ -146,14 +150,23 @@ static bool evict(struct residency *r, uint64_t bytes, const struct scene *keep)
     return false;
 }
 
+/* What was deleted is gone from a software device, too, where it would not fit beside so many bytes. */
+static void release(const struct residency *r, uint64_t bytes)
+{
+    uint64_t deleted = gl_deleted_bytes();
+    if (r->ctx->software && deleted >= RELEASED_BYTES && bytes + deleted > r->budget)
+        gl_release();
+}
+
 bool residency_make_room(struct residency *r, uint64_t more, const struct scene *keep)
 {
     for (;;) {
         uint64_t bytes = residency_claimed(r) + more;
-        if (bytes <= r->budget && r->scene_count < MOST_SCENES)
-            return true;
-        if (!evict(r, bytes > r->budget ? bytes - r->budget : 0, keep))
-            return false;
+        bool fits = bytes <= r->budget && r->scene_count < MOST_SCENES;
+        if (fits || !evict(r, bytes > r->budget ? bytes - r->budget : 0, keep)) {
+            release(r, bytes);
+            return fits;
+        }
     }
 }
 
@@ -278,6 +291,7 @@ void residency_stop(struct residency *r)
     kept_sums_store_destroy(r->ctx->kept_sums);
     emission_cache_destroy(r->emissions);
     gl_programs_destroy(r->ctx->programs);
+    gl_release_finish();
 }
 
 void residency_rest_others(struct residency *r, const struct scene *scene)

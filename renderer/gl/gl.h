@@ -37,7 +37,7 @@
     F(GENERATETEXTUREMIPMAP, GenerateTextureMipmap) F(GETERROR, GetError) \
     F(GETGRAPHICSRESETSTATUS, GetGraphicsResetStatus) F(GETINTEGERV, GetIntegerv) \
     F(GETMULTISAMPLEFV, GetMultisamplefv) \
-    F(GETINTEGER64V, GetInteger64v) \
+    F(GETINTEGER64V, GetInteger64v) F(GETINTEGERI_V, GetIntegeri_v) \
     F(GETNAMEDBUFFERSUBDATA, GetNamedBufferSubData) F(GETPROGRAMINFOLOG, GetProgramInfoLog) \
     F(GETPROGRAMIV, GetProgramiv) F(GETPROGRAMRESOURCEINDEX, GetProgramResourceIndex) \
     F(GETPROGRAMRESOURCEIV, GetProgramResourceiv) F(GETQUERYOBJECTUI64V, GetQueryObjectui64v) \

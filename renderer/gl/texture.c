@@ -3,6 +3,7 @@
 #include <string.h>
 
 static struct gl_account *charged;
+static uint64_t deleted; /* there is one GL thread */
 
 struct gl_account *gl_textures_charge(struct gl_account *account)
 {
@@ -14,6 +15,21 @@ struct gl_account *gl_textures_charge(struct gl_account *account)
 bool gl_textures_make_room(uint64_t bytes)
 {
     return !charged || !charged->make_room || charged->make_room(charged->owner, bytes);
+}
+
+void gl_deleted_add(uint64_t bytes)
+{
+    deleted += bytes;
+}
+
+uint64_t gl_deleted_bytes(void)
+{
+    return deleted;
+}
+
+void gl_deleted_forget(void)
+{
+    deleted = 0;
 }
 
 void gl_texture_release_account(struct gl_texture *texture)
@@ -116,8 +132,10 @@ void gl_texture_destroy(struct gl_texture *texture)
     if (!texture)
         return;
     gl_texture_release_account(texture);
-    if (texture->name)
+    if (texture->name) {
         gl.DeleteTextures(1, &texture->name);
+        gl_deleted_add(texture->bytes);
+    }
     memset(texture, 0, sizeof *texture);
 }
 

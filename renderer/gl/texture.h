@@ -36,6 +36,11 @@ struct gl_texture gl_texture_create_samples(
     GLenum format, uint32_t width, uint32_t height, uint32_t samples);
 void gl_texture_destroy(struct gl_texture *texture);
 
+/* Of what was deleted since gl_deleted_forget: textures, and what others add. */
+void gl_deleted_add(uint64_t bytes);
+uint64_t gl_deleted_bytes(void);
+void gl_deleted_forget(void);
+
 /* A framebuffer with level 0 of these as its attachments, for what gl_target does not fit: several
  * at once, or one that lasts as long as a pass. `depth` may be NULL. */
 GLuint gl_framebuffer_create(

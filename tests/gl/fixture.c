@@ -88,3 +88,13 @@ double fixture_distance(const struct pen_frame *a, const struct pen_frame *b)
         sum += (double)(x[i] - y[i]) * (x[i] - y[i]);
     return sqrt(sum / (double)bytes);
 }
+
+double fixture_resident_mib(void)
+{
+    long size = 0, resident = 0;
+    FILE *file = fopen("/proc/self/statm", "r");
+    if (!file || fscanf(file, "%ld %ld", &size, &resident) != 2)
+        exit(1);
+    fclose(file);
+    return (double)resident * (double)sysconf(_SC_PAGESIZE) / (1 << 20);
+}

@@ -21,3 +21,5 @@ uint64_t fixture_render(
 uint64_t fixture_hash(const struct pen_frame *frame);
 /* Root of the mean squared difference of the first planes' bytes; both of four channels and one size. */
 double fixture_distance(const struct pen_frame *a, const struct pen_frame *b);
+/* What of this process is in memory. */
+double fixture_resident_mib(void);

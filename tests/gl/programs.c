@@ -30,16 +30,6 @@ static const struct pen_param *row_of(const char *technique, const char *name)
     return pen_param_find(pen_catalogue_find(pen_renderer_catalogue(), technique)->params, name);
 }
 
-static double resident_mib(void)
-{
-    long size = 0, resident = 0;
-    FILE *file = fopen("/proc/self/statm", "r");
-    CHECK(file && fscanf(file, "%ld %ld", &size, &resident) == 2);
-    if (file)
-        fclose(file);
-    return (double)resident * (double)sysconf(_SC_PAGESIZE) / (1 << 20);
-}
-
 /* 500 renders with 500 tap counts: one program for all of them. */
 static void check_taps(void)
 {
@@ -52,14 +42,14 @@ static void check_taps(void)
     small_request(&request, id, "pcss");
     uint64_t first = fixture_render(r, &request, &result), others = 0;
     uint32_t compiled = result.programs.compiled;
-    double before = resident_mib();
+    double before = fixture_resident_mib();
     CHECK(compiled > 0 && result.programs.kept == compiled);
     for (int i = 0; i < RENDERS; i++) {
         set(&request, row_of("pcss", "search_taps"), 1 + i % SEARCHES);
         set(&request, row_of("pcss", "filter_taps"), 1 + i / SEARCHES * 10);
         others += fixture_render(r, &request, &result) != first;
     }
-    double grown = resident_mib() - before;
+    double grown = fixture_resident_mib() - before;
     fprintf(stderr, "%d tap counts: %u compiled, %u since the first; %.1f MiB more resident\n",
         RENDERS, result.programs.compiled, result.programs.compiled - compiled, grown);
     CHECK(result.programs.compiled == compiled);
@@ -90,7 +80,7 @@ static void check_bound(void)
     uint32_t distinct = result.programs.compiled;
     CHECK(result.programs.kept == distinct && distinct > 4 * MOST);
     fprintf(stderr, "%u programs, an estimated %.1f MiB; %.1f MiB resident\n", distinct,
-        (double)result.programs.bytes / (1 << 20), resident_mib());
+        (double)result.programs.bytes / (1 << 20), fixture_resident_mib());
     pen_renderer_destroy(all);
 
     struct pen_renderer *few = make(MOST);

@@ -1,4 +1,7 @@
 /* What stays in GPU memory between requests, what leaves it, and that neither changes a pixel. */
+#include "renderer/gl/release.h"
+#include "renderer/gl/target.h"
+#include "renderer/gl/timer.h"
 #include "tests/gl/fixture.h"
 #include "tests/unit/check.h"
 
@@ -66,8 +69,53 @@ static void check_eviction(void)
             fixture_scene(r, PEN_GENERATED_HAIRBALL, 200000, i + 1, ids[i]);
         fixture_request(&request, ids[i], "pcf");
         CHECK(fixture_render(r, &request, &result) == first[i]);
+        /* A software device has let go of most of what had to leave. */
+        CHECK(!result.device.software || gl_deleted_bytes() < 32 << 20);
     }
     pen_renderer_destroy(r);
+}
+
+/* Textures that were deleted leave the memory of the process, and nothing else changes. */
+static void check_release(const struct pen_renderer *r)
+{
+    enum { ARRAYS = 8, LAYERS = 8, SIDE = 1024 }; /* 256 MiB */
+    struct gl_target arrays[ARRAYS] = {{{0}}}, drawn = {0};
+    GLint view[4], framebuffer = 0, program = 1;
+    if (!pen_renderer_device(r)->software)
+        return;
+    gl_release();
+    double before = fixture_resident_mib();
+    for (uint32_t i = 0; i < ARRAYS; i++) {
+        gl_target_fit(&arrays[i], GL_R32F, SIDE, SIDE, LAYERS, 1);
+        for (uint32_t layer = 0; layer < LAYERS; layer++) {
+            gl_target_aim(&arrays[i], 0, layer);
+            gl_target_clear(&arrays[i], (float[4]){1});
+            gl.Flush();
+        }
+    }
+    gl_wait();
+    double full = fixture_resident_mib();
+    for (uint32_t i = 0; i < ARRAYS; i++)
+        gl_target_destroy(&arrays[i]);
+    gl_wait();
+    double deleted = fixture_resident_mib();
+    CHECK(gl_deleted_bytes() == (uint64_t)ARRAYS * LAYERS * SIDE * SIDE * 4);
+    gl_target_fit(&drawn, GL_RGBA8, 8, 4, 0, 1);
+    gl.BindFramebuffer(GL_FRAMEBUFFER, drawn.framebuffer);
+    gl.Viewport(1, 2, 3, 4);
+    gl.UseProgram(0);
+    gl_release();
+    double after = fixture_resident_mib();
+    gl.GetIntegerv(GL_VIEWPORT, view);
+    gl.GetIntegerv(GL_DRAW_FRAMEBUFFER_BINDING, &framebuffer);
+    gl.GetIntegerv(GL_CURRENT_PROGRAM, &program);
+    CHECK(framebuffer == (GLint)drawn.framebuffer && program == 0);
+    gl_target_destroy(&drawn);
+    fprintf(stderr, "%.0f MiB: drawn %.0f, deleted %.0f, released %.0f\n", before, full, deleted,
+        after);
+    CHECK(view[0] == 1 && view[1] == 2 && view[2] == 3 && view[3] == 4);
+    CHECK(full > before + 200 && after < before + 24);
+    CHECK(gl_deleted_bytes() < 1024);
 }
 
 static void check_drop(struct pen_renderer *r, const uint8_t *id)
@@ -179,6 +227,7 @@ int main(void)
     fixture_scene(r, PEN_GENERATED_DEMO, 0, 0, id);
     check_repeats(r, id);
     check_completed(r, id);
+    check_release(r);
     check_drop(r, id);
     pen_renderer_destroy(r);
     check_eviction();

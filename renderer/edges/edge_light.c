@@ -190,33 +190,51 @@ static bool differs(const struct edge_rows *e, uint32_t x, uint32_t y)
     return false;
 }
 
-static uint32_t wanted_pixels(const struct edge_rows *e, uint32_t x, uint32_t y)
+/* Of a tile's pixels, bits, those in the picture, and where it is not of one colour. */
+static uint32_t shown_pixels(const struct edge_rows *e, uint32_t x, uint32_t y, uint32_t bits)
 {
-    uint32_t bits = bent_in_tile(e, e->solid.depths, x, y), wanted = 0;
-    if (e->layered)
-        bits |= bent_in_tile(e, e->nearest, x, y);
+    uint32_t shown = 0;
     for (; bits; bits &= bits - 1) {
         uint32_t bit = (uint32_t)__builtin_ctz(bits);
         uint32_t px = x + bit % COVER_TILE, py = y + bit / COVER_TILE;
         if (px < e->view->width && py < e->view->height && differs(e, px, py))
-            wanted |= 1u << bit;
+            shown |= 1u << bit;
     }
-    return wanted;
+    return shown;
 }
 
-uint32_t edge_find(const struct edge_rows *e, struct cover_tile *tiles)
+static uint32_t wanted_pixels(const struct edge_rows *e, bool all, uint32_t x, uint32_t y)
+{
+    uint32_t bits = bent_in_tile(e, e->solid.depths, x, y);
+    if (e->layered)
+        bits |= bent_in_tile(e, e->nearest, x, y);
+    return all ? bits : shown_pixels(e, x, y, bits);
+}
+
+uint32_t edge_find(const struct edge_rows *e, bool all, struct cover_tile *tiles)
 {
     uint32_t across = (e->view->width + COVER_TILE - 1) / COVER_TILE, slots = 0;
     for (uint32_t y = e->first; y < e->first + e->rows; y += COVER_TILE)
         for (uint32_t column = 0; column < across; column++) {
             struct cover_tile *tile = &tiles[y / COVER_TILE * across + column];
-            *tile = (struct cover_tile){.pixels = wanted_pixels(e, column * COVER_TILE, y)};
+            *tile = (struct cover_tile){.pixels = wanted_pixels(e, all, column * COVER_TILE, y)};
             if (!tile->pixels)
                 continue;
             tile->farthest = farthest_around(e, column * COVER_TILE, y);
             tile->slot = slots++;
         }
     return slots;
+}
+
+void edge_choose(const struct edge_rows *e, const struct cover_tile *all, struct cover_tile *tiles)
+{
+    uint32_t across = (e->view->width + COVER_TILE - 1) / COVER_TILE;
+    for (uint32_t y = e->first; y < e->first + e->rows; y += COVER_TILE)
+        for (uint32_t column = 0; column < across; column++) {
+            uint32_t i = y / COVER_TILE * across + column;
+            tiles[i] = all[i];
+            tiles[i].pixels = shown_pixels(e, column * COVER_TILE, y, all[i].pixels);
+        }
 }
 
 static float dot(const float a[3], const float b[3])

@@ -29,8 +29,11 @@ struct edge_rows {
 uint32_t edge_stride(uint32_t width);
 /* After the depths of the picture's rows are there: what lies around them. */
 void edge_pad(const struct edge_rows *e, float *depths);
-/* Fills the tiles of the rows. Returns how many slots they have: one each where places are wanted. */
-uint32_t edge_find(const struct edge_rows *e, struct cover_tile *tiles);
+/* Fills the tiles of the rows with what this picture shows edges in or, `all`, any that there is of what was
+ * drawn. Returns how many slots they have: one each where places are wanted. */
+uint32_t edge_find(const struct edge_rows *e, bool all, struct cover_tile *tiles);
+/* Of `all` tiles what this picture shows. */
+void edge_choose(const struct edge_rows *e, const struct cover_tile *all, struct cover_tile *tiles);
 /* One row of tiles, from row y on. */
 void edge_blend(const struct edge_rows *e, const struct cover_tile *tiles, uint32_t y);
 /* Bytes of a pixel. */

@@ -139,6 +139,15 @@ struct band {
     uint8_t *before, *last; /* the row above the next band */
 };
 
+/* The whole picture is one band, of which all is known but what it looks like. */
+struct frame_edges {
+    bool known;
+    struct band band;
+    struct view view;       /* band.rows has it */
+    struct cover_tile *all; /* that any picture may show */
+    struct gl_texture memory;
+};
+
 static void read_depths(const struct band *b, const struct gl_texture *texture, float *depths)
 {
     const struct edge_rows *e = &b->rows;
@@ -166,13 +175,11 @@ static void read_normals(
         normals + (size_t)(from + 1 - e->first) * width);
 }
 
-/* What was drawn, and the picture before edges are made smooth in it. */
+/* What was drawn. */
 static void read_rows(struct band *b)
 {
     struct edge_rows *e = &b->rows;
     const struct frame_targets *t = b->job->targets;
-    uint32_t end = e->first + e->rows;
-    size_t row = (size_t)e->view->width * edge_pixel_bytes(e->plane);
     read_depths(b, &t->gbuffer.depth.texture, e->solid.depths);
     read_normals(b, &t->gbuffer.normal.texture, e->solid.normals);
     if (e->layered) {
@@ -182,10 +189,23 @@ static void read_rows(struct band *b)
         for (size_t i = 0; i < count; i++)
             e->nearest[i] = fmaxf(e->solid.depths[i], e->front.depths[i]);
     }
+}
+
+/* The picture before edges are made smooth in it. */
+static void copy_rows(struct band *b)
+{
+    const struct edge_rows *e = &b->rows;
+    uint32_t end = e->first + e->rows;
+    size_t row = (size_t)e->view->width * edge_pixel_bytes(e->plane);
     memcpy(b->before, b->last, row);
     memcpy(b->before + row, (const uint8_t *)e->plane->data + e->first * row,
         (e->rows + (end < e->view->height)) * row);
     memcpy(b->last, b->before + e->rows * row, row);
+}
+
+static uint32_t tile_count(const struct view *v)
+{
+    return ((v->width + OPEN_TILE - 1) / OPEN_TILE) * ((v->height + OPEN_TILE - 1) / OPEN_TILE);
 }
 
 static void take_memory(struct band *b, uint32_t rows)
@@ -200,11 +220,17 @@ static void take_memory(struct band *b, uint32_t rows)
         surfaces[i]->normals = pen_alloc(pixels, sizeof *e->solid.normals);
     }
     e->nearest = e->layered ? pen_alloc(depths, sizeof *e->nearest) : NULL;
-    b->tiles = pen_alloc((size_t)((width + OPEN_TILE - 1) / OPEN_TILE) *
-                             ((e->view->height + OPEN_TILE - 1) / OPEN_TILE),
-        sizeof *b->tiles);
+    b->tiles = pen_alloc(tile_count(e->view), sizeof *b->tiles);
     e->before = b->before = pen_alloc(pixels, edge_pixel_bytes(e->plane));
     b->last = pen_alloc_zero(width, edge_pixel_bytes(e->plane));
+}
+
+static void free_places(struct band *b)
+{
+    for (int i = 0; i < 2; i++) {
+        free(b->places[i]);
+        b->places[i] = NULL;
+    }
 }
 
 static void free_memory(struct band *b)
@@ -218,6 +244,7 @@ static void free_memory(struct band *b)
     free(b->tiles);
     free(b->before);
     free(b->last);
+    free_places(b);
 }
 
 static bool cover_band(struct band *b, uint32_t slots, struct pen_error *error)
@@ -225,6 +252,7 @@ static bool cover_band(struct band *b, uint32_t slots, struct pen_error *error)
     const struct frame_job *job = b->job;
     struct edge_rows *e = &b->rows;
     size_t places = (size_t)slots * COVER_PIXELS;
+    free_places(b);
     struct places_pass solid = {e->layered ? PLACES_SOLID : PLACES_ALL, job->request->ground.on,
                            e->first, e->rows},
                        front = {PLACES_BLENDED, false, e->first, e->rows};
@@ -254,27 +282,97 @@ static bool smooth_band(struct band *b, struct pen_error *error)
     struct gl_timer *timer = &b->job->ctx->timer;
     gl_timer_begin(timer, PEN_STAGE_SHADE, "edge tiles");
     read_rows(b);
-    uint32_t slots = edge_find(&b->rows, b->tiles);
+    copy_rows(b);
+    uint32_t slots = edge_find(&b->rows, false, b->tiles);
     gl_timer_end(timer);
-    bool ok = pass_turn(b->job->ctx, error) &&
-              (!slots || (cover_band(b, slots, error) && blend_band(b, error)));
-    for (int i = 0; i < 2; i++) {
-        free(b->places[i]);
-        b->places[i] = NULL;
+    return pass_turn(b->job->ctx, error) &&
+           (!slots || (cover_band(b, slots, error) && blend_band(b, error)));
+}
+
+static struct band make_band(const struct frame_job *job, const struct view *view, bool raw)
+{
+    return (struct band){.job = job,
+        .rows = {.view = view,
+            .focal = 0.5f * (float)view->height / tanf(0.5f * view->fov_y_rad),
+            .layered = frame_is_layered(job),
+            .raw = raw}};
+}
+
+static uint32_t most_rows(uint32_t width)
+{
+    return BAND_PIXELS / width / OPEN_TILE * OPEN_TILE;
+}
+
+void frame_edges_keep(const struct frame_job *job)
+{
+    const struct pen_request *r = job->request;
+    if (!job->targets->edges && frame_edges_are_smooth(job) && !frame_edges_are_drawn(job) &&
+        r->height <= most_rows(r->width))
+        job->targets->edges = pen_alloc_zero(1, sizeof *job->targets->edges);
+}
+
+void frame_edges_drop(struct frame_targets *targets)
+{
+    struct frame_edges *kept = targets->edges;
+    if (!kept)
+        return;
+    gl_texture_release_account(&kept->memory);
+    if (kept->band.tiles)
+        free_memory(&kept->band);
+    free(kept->all);
+    free(kept);
+    targets->edges = NULL;
+}
+
+/* All that the picture's surfaces say. */
+static bool know(struct frame_edges *kept, struct pen_error *error)
+{
+    struct band *b = &kept->band;
+    struct edge_rows *e = &b->rows;
+    struct gl_timer *timer = &b->job->ctx->timer;
+    gl_timer_begin(timer, PEN_STAGE_SHADE, "edge tiles");
+    read_rows(b);
+    uint32_t slots = edge_find(e, true, b->tiles);
+    memcpy(kept->all, b->tiles, tile_count(e->view) * sizeof *kept->all);
+    gl_timer_end(timer);
+    uint64_t pixel = sizeof *e->nearest + sizeof *e->solid.normals, kinds = 1 + e->layered;
+    gl_textures_count(&kept->memory, kinds * ((uint64_t)slots * COVER_PIXELS * sizeof **b->places +
+                                                 pixel * e->view->width * e->rows));
+    return pass_turn(b->job->ctx, error) && cover_band(b, slots, error);
+}
+
+static bool smooth_kept(struct frame_edges *kept, const struct frame_job *job,
+    const struct view *view, bool raw, struct pen_plane *plane, struct pen_error *error)
+{
+    struct band *b = &kept->band;
+    struct gl_timer *timer = &job->ctx->timer;
+    if (!b->tiles) {
+        kept->view = *view;
+        *b = make_band(job, &kept->view, raw);
+        b->rows.plane = plane;
+        b->rows.rows = view->height;
+        take_memory(b, view->height);
+        kept->all = pen_alloc(tile_count(view), sizeof *kept->all);
     }
-    return ok;
+    b->rows.plane = plane;
+    if (!kept->known && !know(kept, error))
+        return false;
+    kept->known = true;
+    gl_timer_begin(timer, PEN_STAGE_SHADE, "edge tiles");
+    copy_rows(b);
+    edge_choose(&b->rows, kept->all, b->tiles);
+    gl_timer_end(timer);
+    return pass_turn(job->ctx, error) && blend_band(b, error);
 }
 
 bool frame_edges_smooth(const struct frame_job *job, const struct view *view, bool raw,
     struct pen_plane *plane, struct pen_error *error)
 {
-    uint32_t height = view->height, most = BAND_PIXELS / view->width / OPEN_TILE * OPEN_TILE;
-    struct band b = {.job = job,
-        .rows = {.view = view,
-            .focal = 0.5f * (float)height / tanf(0.5f * view->fov_y_rad),
-            .layered = frame_is_layered(job),
-            .raw = raw,
-            .plane = plane}};
+    uint32_t height = view->height, most = most_rows(view->width);
+    if (job->targets->edges)
+        return smooth_kept(job->targets->edges, job, view, raw, plane, error);
+    struct band b = make_band(job, view, raw);
+    b.rows.plane = plane;
     bool ok = true;
     take_memory(&b, most < height ? most : height);
     for (; ok && b.rows.first < height; b.rows.first += most) {

@@ -7,11 +7,12 @@
 #include "renderer/frame/output.h"
 #include "renderer/frame/progress.h"
 #include "renderer/frame/resolution.h"
-#include "renderer/frame/sky.h"
+#include "renderer/frame/shade.h"
 #include "renderer/light/meter.h"
 #include "renderer/passes/draw/gbuffer.h"
 #include "renderer/passes/draw/screen.h"
 #include "renderer/passes/draw/turn.h"
+#include "renderer/passes/filter/changed.h"
 #include "renderer/passes/filter/history.h"
 #include "renderer/passes/map/bound.h"
 #include "renderer/passes/map/shadow_cache.h"
@@ -19,9 +20,6 @@
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
-
-#define SHARED_ROWS "renderer/shaders/frame/shade.def"
-#include "renderer/shared/rows_c.h"
 
 #define SKETCH_SAMPLES 16
 
@@ -40,6 +38,7 @@ struct frame {
     bool layer;                    /* it is a blended one */
     bool data;                     /* data layers are about it */
     bool sky_known;                /* of it */
+    bool shaded;                   /* the picture is, with what was visible when it was shown */
     bool sketching; /* few samples of each light are taken, so that there is something of all */
     bool sketched;  /* that is done */
     struct frame_work work;
@@ -330,88 +329,29 @@ static bool record_visibility(struct frame *f, struct pen_error *error)
     return !uncounted || frame_layers_count_receivers(job, f->number, &f->work, error);
 }
 
-static void scale3(float out[4], const float v[3], float factor, float w)
-{
-    for (int i = 0; i < 3; i++)
-        out[i] = v[i] * factor;
-    out[3] = w;
-}
-
-static void make_shade_block(const struct frame *f, struct shade_block *b)
-{
-    memset(b, 0, sizeof *b);
-    sky_choose(b, f->job->request, &f->view);
-    for (uint32_t i = 0; i < f->light_count; i++) {
-        const struct light *l = &f->lights[i];
-        const struct light_face *face = &l->faces[0];
-        const struct pen_light *s = l->source;
-        scale3(b->lights[i].origin, l->origin, 1, (float)s->type);
-        scale3(b->lights[i].half_x, l->x, face->extent[0], s->radius);
-        scale3(b->lights[i].half_y, l->y, face->extent[1], cosf(glm_rad(s->inner_cone_deg)));
-        scale3(b->lights[i].z, l->z, 1, cosf(glm_rad(s->outer_cone_deg)));
-        scale3(b->lights[i].radiance, l->radiance, 1, 0);
-        scale3(b->lights[i].open, face->emission_mean, 1, 0);
-    }
-}
-
-static bool shade(struct frame *f, struct pen_error *error)
+static bool shade(struct frame *f, bool shown, struct pen_error *error)
 {
     const struct frame_job *job = f->job;
-    const struct frame_targets *t = job->targets;
-    const struct gbuffer *g = f->gbuffer;
-    bool direct = frame_output_is_direct(job), layered = frame_is_layered(job),
-         emission = g->emission.texture.name != 0;
-    const struct gl_target *target = layered                      ? &t->layers
-                                     : !direct                    ? &t->beauty
-                                     : frame_edges_are_drawn(job) ? &t->stairs
-                                                                  : &t->color;
-    struct shade_block block;
-    make_shade_block(f, &block);
-    struct pass_texture textures[] = {{UNIT_DEPTH, g->depth.texture.name, GL_SAMPLE_NEAREST},
-        {UNIT_NORMAL, g->normal.texture.name, GL_SAMPLE_NEAREST},
-        {UNIT_ALBEDO, g->albedo.texture.name, GL_SAMPLE_NEAREST},
-        {UNIT_SURFACE, g->surface.texture.name, GL_SAMPLE_NEAREST},
-        {UNIT_SOURCE, t->vis.texture.name, GL_SAMPLE_NEAREST},
-        {UNIT_SKY_OPEN, t->sky_open[1].texture.name, GL_SAMPLE_NEAREST},
-        {UNIT_EMITTED, g->emission.texture.name, GL_SAMPLE_NEAREST}};
-    bool rect = false, round = false, punctual = false;
-    for (uint32_t i = 0; i < f->light_count; i++) {
-        uint32_t type = f->lights[i].source->type;
-        rect |= type == PEN_LIGHT_RECT;
-        round |= type == PEN_LIGHT_DISK || type == PEN_LIGHT_SPHERE;
-        punctual |= type >= PEN_LIGHT_SUN;
-    }
-    char defines[320];
-    snprintf(defines, sizeof defines, "#define LIGHTS %u\n%s%s%s%s%s%s%s%s%s%s%s", f->light_count,
-        layered ? "#define LAYERED\n" : "", f->layer ? "#define LAYER\n" : "",
-        pen_request_is_transparent(job->request) ? "#define TRANSPARENT\n" : "",
-        job->request->ground.on == PEN_FLAG_WORD && !f->layer ? "#define CATCHER\n" : "",
-        job->request->sky.on ? "#define SKY\n" : "",
-        job->scene->has_gloss ? "#define GLOSSY\n" : "", direct ? "#define RESOLVE\n" : "",
-        emission ? "#define EMIT\n" : "", rect ? "#define HAS_RECT\n" : "",
-        round ? "#define HAS_ROUND\n" : "", punctual ? "#define HAS_PUNCTUAL\n" : "");
-    return pass_fill(job->ctx,
-        &(struct pass_fill){.name = "shade",
-            .fragment = "shade.frag",
-            .defines = defines,
-            .stage = PEN_STAGE_SHADE,
-            .textures = textures,
-            .texture_count = emission ? 7 : 6,
-            .framebuffer = target->framebuffer,
-            .width = job->request->width,
-            .height = job->request->height,
-            .add = !direct && !layered,
-            .under = layered,
-            .extra = &block,
-            .extra_bytes = sizeof block},
-        error);
+    struct shading shading = {.view = &f->view,
+        .gbuffer = f->gbuffer,
+        .lights = f->lights,
+        .light_count = f->light_count,
+        .layer = f->layer};
+    if (!frame_output_is_direct(job))
+        return frame_shade(job, &shading, error);
+    /* What has not changed since the last picture is as it was. */
+    if ((shown || f->shaded) &&
+        !pass_changed(job->ctx, &job->targets->vis.texture, f->shaded, &shading.tiles, error))
+        return false;
+    f->shaded = shown;
+    return frame_shade(job, &shading, error);
 }
 
 /* Light and shadow of what is in a G-buffer. */
 static bool light_up(struct frame *f, bool beauty, struct pen_error *error)
 {
     return (!frame_needs_shadows(f->job->request) || record_visibility(f, error)) &&
-           (!beauty || (know_sky(f, error) && shade(f, error)));
+           (!beauty || (know_sky(f, error) && shade(f, false, error)));
 }
 
 static bool draw(
@@ -472,6 +412,7 @@ static bool show_frame(struct frame *f, uint32_t frames, struct pen_error *error
     const struct frame_job *job = f->job;
     struct pen_frame picture;
     struct pen_result result = *f->result;
+    frame_edges_keep(job);
     if (!frame_output_read(job, &f->view, frames, &picture, error))
         return false;
     gl_timer_collect(&job->ctx->timer, &result);
@@ -485,15 +426,14 @@ static bool show_frame(struct frame *f, uint32_t frames, struct pen_error *error
  * then. */
 static bool show_estimate(struct frame *f, struct pen_error *error)
 {
-    const struct pen_request *r = f->job->request;
     struct frame_targets *t = f->job->targets;
     static const float zero[4] = {0};
-    bool beauty = frame_needs(r, PEN_SOURCE_BEAUTY),
-         visibility = frame_needs(r, PEN_SOURCE_VISIBILITY);
+    bool beauty = frame_needs(f->job->request, PEN_SOURCE_BEAUTY),
+         visibility = frame_needs(f->job->request, PEN_SOURCE_VISIBILITY);
     bool layered = frame_is_layered(f->job);
     if (layered)
         frame_blended_keep(f->job);
-    bool ok = (!beauty || (know_sky(f, error) && shade(f, error))) &&
+    bool ok = (!beauty || (know_sky(f, error) && shade(f, true, error))) &&
               (!layered || frame_blended_end(f->job, error)) &&
               (!visibility || frame_layers_add_visibility(f->job, f->light_count, error)) &&
               show_frame(f, 1, error);
@@ -592,6 +532,7 @@ bool frame_render(const struct frame_job *job, struct pen_frame *frame, struct p
     result->triangles_drawn = (uint32_t)f.triangles;
     ok = true;
 done:
+    frame_edges_drop(job->targets);
     if (job->technique->finish)
         job->technique->finish(job->ctx, job->technique_state, result);
     gl.DeleteQueries(PEN_MAX_ANTIALIAS, f.work.queries);

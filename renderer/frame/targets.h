@@ -4,6 +4,8 @@
 
 #define FRAME_MEANS 3
 
+struct frame_edges;
+
 struct frame_targets {
     struct gbuffer gbuffer;
     struct gl_target vis;    /* RGBA16F array, a layer per light; aimed at the light at work */
@@ -25,6 +27,7 @@ struct frame_targets {
     /* Of a picture that is seen before it is complete: R32F, mean visibilities; RG32F, how far they
      * are apart, by tiles. */
     struct gl_target means[FRAME_MEANS], spread;
+    struct frame_edges *edges;    /* edges.h; of the frame in progress, or NULL */
     struct gl_target sky_open[2]; /* R8, half size: how much of the sky is seen; raw, smooth */
 };
 /* Makes a sum fit the request's picture and start at 0. */

@@ -32,6 +32,13 @@ void gl_deleted_forget(void)
     deleted = 0;
 }
 
+void gl_textures_count(struct gl_texture *memory, uint64_t bytes)
+{
+    *memory = (struct gl_texture){.bytes = bytes, .account = charged};
+    if (charged)
+        charged->bytes += bytes;
+}
+
 void gl_texture_release_account(struct gl_texture *texture)
 {
     if (texture->account)

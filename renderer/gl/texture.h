@@ -24,6 +24,9 @@ struct gl_account {
 struct gl_account *gl_textures_charge(struct gl_account *account);
 /* Asks whom new textures are charged to for room, as one of so many bytes does. */
 bool gl_textures_make_room(uint64_t bytes);
+/* Memory of the processor that belongs to what is drawn, counted as if it were a texture's until that is
+ * destroyed; nobody is asked for room. */
+void gl_textures_count(struct gl_texture *memory, uint64_t bytes);
 /* From now on its bytes are counted elsewhere. */
 void gl_texture_release_account(struct gl_texture *texture);
 

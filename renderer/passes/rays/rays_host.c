@@ -77,6 +77,7 @@ struct waiting {
     const struct pen_trace_result *result;
     const struct host_picture *picture;
     struct pen_error *error;
+    float *seen; /* the visibility that is shown, which ends up in vis at once */
 };
 
 static bool turn(void *context)
@@ -101,13 +102,17 @@ static void write_target(const struct technique_run *run, struct gl_target *targ
         layout, GL_FLOAT, from);
 }
 
+static void settle_on_host(const struct waiting *w, const float *visibility)
+{
+    host_picture_settle(w->run, w->picture, w->job->weighting == PEN_TRACE_AREA, visibility);
+}
+
 static void write_result(const struct waiting *w)
 {
     struct technique_run *run = w->run;
     const struct pen_trace_result *result = w->result;
     if (ray_host_settles(run))
-        host_picture_settle(
-            run, w->picture, w->job->weighting == PEN_TRACE_AREA, result->visibility);
+        settle_on_host(w, result->visibility);
     else
         write_target(run, &w->targets->visibility, GL_RGBA32F, GL_RGBA, result->visibility);
     if (result->standard_error)
@@ -116,7 +121,12 @@ static void write_result(const struct waiting *w)
 
 static bool show(void *context)
 {
-    write_result(context);
+    struct waiting *w = context;
+    size_t bytes = (size_t)w->run->width * w->run->height * 16;
+    if (ray_host_settles(w->run))
+        w->seen = memcpy(pen_alloc(bytes, 1), w->result->visibility, bytes);
+    else
+        write_result(w);
     return true;
 }
 
@@ -134,8 +144,11 @@ static bool shown(void *context, struct pen_trace_crew *crew)
     ctx->turns.away = hold;
     ctx->turns.away_context = crew;
     gl_timer_end(&ctx->timer);
-    bool settled = ray_host_settles(w->run) || w->job->settle(w->run, w->error);
-    bool ok = settled && pass_show(w->run, w->error);
+    if (w->seen)
+        settle_on_host(w, w->seen);
+    bool ok = (w->seen || w->job->settle(w->run, w->error)) && pass_show(w->run, w->error);
+    free(w->seen);
+    w->seen = NULL;
     gl_timer_begin(&ctx->timer, PEN_STAGE_TECHNIQUE, "trace");
     ctx->turns.away = NULL;
     return ok;
@@ -233,6 +246,7 @@ bool pass_rays_host(struct technique_run *run, const struct ray_job *job, struct
         run->result->full_work_pixels += (uint32_t)stats.full_receivers;
     }
     host_picture_finish(&picture);
+    free(waiting.seen);
     free(visibility);
     free(standard_error);
     free(emission);

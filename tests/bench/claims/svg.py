@@ -49,12 +49,9 @@ def place_labels(points):
         yield x, y, box, text
 
 
-def scatter(points, x_title, y_title):
-    """points: (x, y, label, kind), all positive; kind is a class of the style sheet."""
-    if not points:
-        return ""
-    x_ticks = decades(min(p[0] for p in points), max(p[0] for p in points))
-    y_ticks = decades(min(p[1] for p in points), max(p[1] for p in points))
+def axes(xs, ys, x_title, y_title, kind):
+    """Opens a plot on two logarithmic axes that show all values: (pieces of SVG, x_of, y_of)."""
+    x_ticks, y_ticks = decades(min(xs), max(xs)), decades(min(ys), max(ys))
 
     def scale(value, ticks, low, high):
         if ticks[0] == ticks[-1]:
@@ -68,8 +65,8 @@ def scatter(points, x_title, y_title):
     def y_of(value):
         return scale(value, y_ticks, HEIGHT - BOTTOM, TOP)
 
-    out = ['<svg class="scatter" viewBox="0 0 %d %d" role="img" aria-label="%s against %s">' % (
-        WIDTH, HEIGHT, escape(y_title, True), escape(x_title, True))]
+    out = ['<svg class="%s" viewBox="0 0 %d %d" role="img" aria-label="%s against %s">' % (
+        kind, WIDTH, HEIGHT, escape(y_title, True), escape(x_title, True))]
     for tick in x_ticks:
         x = x_of(tick)
         out.append('<path class="grid" d="M%.1f %dV%d"/><text class="tick" x="%.1f" y="%d" '
@@ -83,6 +80,32 @@ def scatter(points, x_title, y_title):
         (LEFT + WIDTH - RIGHT) / 2, HEIGHT - 10, escape(x_title)))
     out.append('<text class="axis" transform="translate(14 %d) rotate(-90)" text-anchor="middle">'
                '%s</text>' % ((TOP + HEIGHT - BOTTOM) / 2, escape(y_title)))
+    return out, x_of, y_of
+
+
+def curves(lines, x_title, y_title):
+    """lines: {name: [(x, y)]} by increasing x, all positive; the name stands at the last point."""
+    every = [point for points in lines.values() for point in points]
+    if not every:
+        return ""
+    out, x_of, y_of = axes([x for x, _ in every], [y for _, y in every], x_title, y_title, "curves")
+    names = {}
+    for name, points in lines.items():
+        at = [(x_of(x), y_of(y)) for x, y in points]
+        out.append('<path class="line" d="M%s"/>' % "L".join("%.1f %.1f" % p for p in at))
+        names[at[-1] + (name,)] = name
+    for x, y, (left, _, _, bottom), name in place_labels(list(names)):
+        out.append('<circle cx="%.1f" cy="%.1f" r="2.5"/><text x="%.1f" y="%.1f">%s</text>' % (
+            x, y, left, bottom - 2, escape(name)))
+    return "".join(out) + "</svg>"
+
+
+def scatter(points, x_title, y_title):
+    """points: (x, y, label, kind), all positive; kind is a class of the style sheet."""
+    if not points:
+        return ""
+    out, x_of, y_of = axes([p[0] for p in points], [p[1] for p in points], x_title, y_title,
+                           "scatter")
     kinds = {(x_of(x), y_of(y), label): kind for x, y, label, kind in points}
     for x, y, (left, top, right, bottom), text in place_labels(list(kinds)):
         kind = kinds[(x, y, text)]

@@ -5,8 +5,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-#define BEHIND 0.998f /* what is less than this behind something may be part of it */
-#define FAR_OUT 1e6f  /* px: from here on a corner's place is not exact enough */
+#define FAR_OUT 1e6f /* px: from here on a corner's place is not exact enough */
 
 const cover_places cover_across = {-0.125f, 0.375f, -0.375f, 0.125f};
 const cover_places cover_down = {-0.375f, -0.125f, 0.125f, 0.375f};
@@ -149,24 +148,48 @@ static bool set_up(const struct drawing *d, const struct corner c[3], struct tri
     return true;
 }
 
-/* Leaves of the places that are covered in a pixel those whose alpha is not cut. */
-static place_bits cut(
-    const struct drawing *d, const struct triangle *t, double x, double y, place_bits covered)
+/* Of the texture; the place may lie outside. */
+static float level_at(const struct drawing *d, const struct triangle *t, double x, double y)
 {
     const struct plane *depth = &t->numbers[3];
-    double middle = plane_at(depth, x, y), numbers[3];
-    places at[3], inverse = 1 / (all((float)middle) + t->offsets[3]);
-    for (int k = 0; k < 3; k++) {
-        numbers[k] = plane_at(&t->alpha[k], x, y);
-        at[k] = (all((float)numbers[k]) + t->alpha_offsets[k]) * inverse;
-    }
+    double middle = plane_at(depth, x, y);
     float across[2], down[2];
-    for (int k = 0; k < 2; k++) { /* at the centre, which may lie outside */
-        double here = numbers[k] / middle;
+    for (int k = 0; k < 2; k++) {
+        double here = plane_at(&t->alpha[k], x, y) / middle;
         across[k] = (float)((t->alpha[k].across - here * depth->across) / middle);
         down[k] = (float)((t->alpha[k].down - here * depth->down) / middle);
     }
-    return cover_alpha_cut(d->alpha, at, cover_alpha_level(d->alpha, across, down), covered);
+    return cover_alpha_level(d->alpha, across, down);
+}
+
+/* Leaves of the places that are covered in a pixel those whose alpha is not cut. */
+static place_bits cut(const struct drawing *d, const struct triangle *t, float level, double x,
+    double y, place_bits covered)
+{
+    float middle = (float)plane_at(&t->numbers[3], x, y);
+    places at[3], inverse = 1 / (all(middle) + t->offsets[3]);
+    for (int k = 0; k < 3; k++)
+        at[k] = (all((float)plane_at(&t->alpha[k], x, y)) + t->alpha_offsets[k]) * inverse;
+    return cover_alpha_cut(d->alpha, at, level, covered);
+}
+
+/* A bit for each pixel of a tile which may have a place inside; first: numbers at the first one. */
+static uint32_t near(const struct triangle *t, places first)
+{
+    const places steps = {0, 1, 2, 3};
+    places reach = first + t->pixel, row[3];
+    uint32_t bits = 0;
+    for (int i = 0; i < 3; i++)
+        row[i] = all(reach[i]) + t->across[i] * steps;
+    for (int y = 0; y < COVER_TILE; y++) {
+        place_bits out = (row[0] < 0.0f) | (row[1] < 0.0f) | (row[2] < 0.0f);
+        place_pairs pairs = (place_pairs)(~out & (place_bits){1, 2, 4, 8});
+        uint64_t both = (uint64_t)(pairs[0] | pairs[1]);
+        bits |= (uint32_t)(both | both >> 32) << COVER_TILE * y;
+        for (int i = 0; i < 3; i++)
+            row[i] += t->down[i];
+    }
+    return bits;
 }
 
 /* Of the tile whose first pixel is at (x, y) those pixels. */
@@ -178,12 +201,11 @@ static void draw_tile(const struct drawing *d, const struct triangle *t, uint32_
         first[i] = (float)plane_at(&t->numbers[i], x + 0.5, y + 0.5);
     if (any(first + t->tile < 0.0f))
         return;
-    for (uint32_t left = pixels; left; left &= left - 1) {
+    float level = NAN; /* the first one's does for all */
+    for (uint32_t left = pixels & near(t, first); left; left &= left - 1) {
         uint32_t bit = (uint32_t)__builtin_ctz(left);
         places here = first + t->across * (float)(bit % COVER_TILE);
         here += t->down * (float)(bit / COVER_TILE);
-        if (any(here + t->pixel < 0.0f))
-            continue;
         place_bits covered = (all(here[0]) + t->offsets[0] >= 0.0f) &
                              (all(here[1]) + t->offsets[1] >= 0.0f) &
                              (all(here[2]) + t->offsets[2] >= 0.0f);
@@ -195,8 +217,11 @@ static void draw_tile(const struct drawing *d, const struct triangle *t, uint32_
         covered &= depth > *depths;
         if (!any(covered))
             continue;
-        if (d->alpha)
-            covered = cut(d, t, x + bit % COVER_TILE + 0.5, y + bit / COVER_TILE + 0.5, covered);
+        if (d->alpha) {
+            double px = x + bit % COVER_TILE + 0.5, py = y + bit / COVER_TILE + 0.5;
+            level = isnan(level) ? level_at(d, t, px, py) : level;
+            covered = cut(d, t, level, px, py, covered);
+        }
         *depths = choose(covered, depth, *depths);
     }
 }
@@ -229,7 +254,7 @@ static void draw(const struct drawing *d, const struct corner c[3])
     for (uint32_t row = y0 / COVER_TILE; row <= y1 / COVER_TILE; row++)
         for (uint32_t column = x0 / COVER_TILE; column <= x1 / COVER_TILE; column++) {
             const struct cover_tile *tile = &cover->tiles[row * across + column];
-            if (!tile->pixels || t.nearest < BEHIND * tile->farthest)
+            if (!tile->pixels || t.nearest <= tile->farthest)
                 continue;
             uint32_t x = column * COVER_TILE, y = row * COVER_TILE;
             uint32_t pixels = tile->pixels & bits_between(x, y, x0, x1, y0, y1);

@@ -11,7 +11,7 @@ extern const cover_places cover_across, cover_down;
 
 /* COVER_TILE x COVER_TILE pixels. */
 struct cover_tile {
-    float farthest;  /* depth (reversed) that is wanted there */
+    float farthest;  /* what is wanted there is nearer */
     uint32_t pixels; /* that are: a bit each, row by row */
     uint32_t slot;   /* where its places are */
 };
@@ -21,7 +21,8 @@ struct cover {
     uint32_t width, height;         /* of the picture */
     uint32_t first, rows;           /* that are drawn */
     const struct cover_tile *tiles; /* of the whole picture */
-    cover_places *depths; /* COVER_PIXELS per slot; 0 to begin with; what is not wanted may stay */
+    /* COVER_PIXELS per slot. To begin with what is wanted must be nearer than; what is not may stay. */
+    cover_places *depths;
 };
 
 struct cover_scene {

@@ -6,6 +6,7 @@
 #define SAME 1 /* of 255: blending what differs by no more changes no more */
 #define AROUND (COVER_TILE + 2)
 #define GUESSES 1024
+#define BEHIND 0.998f /* what is less than this behind something may be part of it */
 #define HALF_MAX 65504.0f
 
 typedef cover_places four;
@@ -148,18 +149,21 @@ static uint32_t bent_in_tile(const struct edge_rows *e, float *depths, uint32_t 
     return bits;
 }
 
-static float farthest_around(const struct edge_rows *e, uint32_t x, uint32_t y)
+static four smaller(four a, four b)
+{
+    return choose(a < b, a, b);
+}
+
+/* Of each of a tile's pixels the farthest of those around. */
+static void farthest_around(const struct edge_rows *e, uint32_t x, uint32_t y, four far[COVER_TILE])
 {
     uint32_t stride = edge_stride(e->view->width);
     const float *row = row_at(e, e->solid.depths, y) + x - stride;
-    four least = load(row);
-    for (uint32_t i = 0; i < AROUND; i++, row += stride) {
-        least = -larger(-least, -load(row - 1));
-        least = -larger(-least, -load(row + 1));
-    }
-    float a = least[0] < least[1] ? least[0] : least[1];
-    float b = least[2] < least[3] ? least[2] : least[3];
-    return a < b ? a : b;
+    four rows[AROUND];
+    for (uint32_t i = 0; i < AROUND; i++, row += stride)
+        rows[i] = smaller(load(row), smaller(load(row - 1), load(row + 1)));
+    for (uint32_t i = 0; i < COVER_TILE; i++)
+        far[i] = smaller(rows[i], smaller(rows[i + 1], rows[i + 2]));
 }
 
 static uint32_t clamped(uint32_t i, int step, uint32_t count)
@@ -218,12 +222,31 @@ uint32_t edge_find(const struct edge_rows *e, bool all, struct cover_tile *tiles
         for (uint32_t column = 0; column < across; column++) {
             struct cover_tile *tile = &tiles[y / COVER_TILE * across + column];
             *tile = (struct cover_tile){.pixels = wanted_pixels(e, all, column * COVER_TILE, y)};
-            if (!tile->pixels)
-                continue;
-            tile->farthest = farthest_around(e, column * COVER_TILE, y);
-            tile->slot = slots++;
+            if (tile->pixels)
+                tile->slot = slots++;
         }
     return slots;
+}
+
+void edge_begin(const struct edge_rows *e, struct cover_tile *tiles, cover_places *places)
+{
+    uint32_t across = (e->view->width + COVER_TILE - 1) / COVER_TILE;
+    for (uint32_t y = e->first; y < e->first + e->rows; y += COVER_TILE)
+        for (uint32_t column = 0; column < across; column++) {
+            struct cover_tile *tile = &tiles[y / COVER_TILE * across + column];
+            cover_places *at = places + (size_t)tile->slot * COVER_PIXELS;
+            four far[COVER_TILE];
+            if (!tile->pixels)
+                continue;
+            farthest_around(e, column * COVER_TILE, y, far);
+            tile->farthest = 1;
+            for (uint32_t left = tile->pixels; left; left &= left - 1) {
+                uint32_t bit = (uint32_t)__builtin_ctz(left);
+                float least = BEHIND * far[bit / COVER_TILE][bit % COVER_TILE];
+                at[bit] = all(least);
+                tile->farthest = least < tile->farthest ? least : tile->farthest;
+            }
+        }
 }
 
 void edge_choose(const struct edge_rows *e, const struct cover_tile *all, struct cover_tile *tiles)

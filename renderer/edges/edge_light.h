@@ -32,6 +32,8 @@ void edge_pad(const struct edge_rows *e, float *depths);
 /* Fills the tiles of the rows with what this picture shows edges in or, `all`, any that there is of what was
  * drawn. Returns how many slots they have: one each where places are wanted. */
 uint32_t edge_find(const struct edge_rows *e, bool all, struct cover_tile *tiles);
+/* Before anything is drawn: at each place what has to be nearer. */
+void edge_begin(const struct edge_rows *e, struct cover_tile *tiles, cover_places *places);
 /* Of `all` tiles what this picture shows. */
 void edge_choose(const struct edge_rows *e, const struct cover_tile *all, struct cover_tile *tiles);
 /* One row of tiles, from row y on. */

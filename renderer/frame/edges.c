@@ -256,8 +256,11 @@ static bool cover_band(struct band *b, uint32_t slots, struct pen_error *error)
     struct places_pass solid = {e->layered ? PLACES_SOLID : PLACES_ALL, job->request->ground.on,
                            e->first, e->rows},
                        front = {PLACES_BLENDED, false, e->first, e->rows};
-    e->solid.places = b->places[0] = pen_alloc_zero(places, sizeof **b->places);
-    e->front.places = b->places[1] = e->layered ? pen_alloc_zero(places, sizeof **b->places) : NULL;
+    e->solid.places = b->places[0] = pen_alloc(places, sizeof **b->places);
+    e->front.places = b->places[1] = e->layered ? pen_alloc(places, sizeof **b->places) : NULL;
+    edge_begin(e, b->tiles, b->places[0]);
+    if (e->layered)
+        memcpy(b->places[1], b->places[0], places * sizeof **b->places);
     return pass_cover(job->ctx, job->scene, e->view, &solid, b->tiles, b->places[0], error) &&
            (!e->layered ||
                pass_cover(job->ctx, job->scene, e->view, &front, b->tiles, b->places[1], error));

@@ -27,7 +27,7 @@ static const struct pen_param rows[] = {
 
 struct state {
     struct ray_targets targets;
-    bool on_host; /* which writes vis itself */
+    bool settled;
 };
 
 static void destroy(struct technique_ctx *ctx, void *state)
@@ -55,24 +55,13 @@ static bool trace(struct technique_run *run, struct pen_error *error)
 {
     const struct denoised *params = run->params;
     struct state *s = run->state;
+    const struct ray_denoising how = {params->samples, params->refine, params->budget};
     struct ray_job job = {.samples = params->samples + params->refine,
         .adaptive = run->face->extent[0] > 0,
         .seed = ray_seed(run, params->seed),
+        .denoising = &how,
         .settle = settle};
-    struct pen_error refused = {0};
-    s->on_host = ray_on_host(run, params->backend);
-    if (!s->on_host && pass_rays_device(run, &job, &s->targets, &refused))
-        return true;
-#ifdef PENUMBRA_HAVE_TRACE
-    bool automatic = params->backend == BACKEND_AUTO && refused.code == PEN_TOO_BIG;
-    struct ray_denoising how = {params->samples, params->refine, params->budget, job.seed};
-    if (automatic)
-        pen_result_warn(run->result, "Rays were traced on the CPU. %s", refused.message);
-    s->on_host |= automatic;
-    if (s->on_host)
-        return pass_rays_denoised(run, &how, error);
-#endif
-    return pen_fail(error, refused.code, refused.pointer, "%s", refused.message);
+    return pass_rays(run, params->backend, &job, &s->targets, &s->settled, error);
 }
 
 static bool record(struct technique_run *run, struct pen_error *error)
@@ -82,7 +71,7 @@ static bool record(struct technique_run *run, struct pen_error *error)
     if (run->face == &run->light->faces[0] && !trace(run, error))
         return false;
     run->work_counted = true;
-    return s->on_host || settle(run, error);
+    return s->settled || settle(run, error);
 }
 
 const struct technique technique_denoised = {

@@ -1,9 +1,8 @@
 /* What methods that trace rays share. */
 #pragma once
-#include "renderer/passes/rays/rays.h"
+#include "renderer/passes/rays/where.h"
 
-/* Without Embree there is no "cpu", and "auto" is "gpu". */
-enum { BACKEND_AUTO, BACKEND_GPU, BACKEND_CPU };
+/* By enum ray_backend. */
 static const char *const backend_names[] = {"auto", "gpu",
 #ifdef PENUMBRA_HAVE_TRACE
     "cpu",
@@ -24,15 +23,4 @@ static const char *const backend_names[] = {"auto", "gpu",
 static inline uint32_t ray_seed(const struct technique_run *run, uint32_t seed)
 {
     return seed + run->frame + LIGHT_SEED * run->light_index;
-}
-
-/* Whether Embree traces; there is no other way back from the GPU than `automatic`. */
-static inline bool ray_on_host(const struct technique_run *run, uint32_t backend)
-{
-#ifdef PENUMBRA_HAVE_TRACE
-    return backend == BACKEND_CPU || (backend == BACKEND_AUTO && run->ctx->software);
-#else
-    (void)run, (void)backend;
-    return false;
-#endif
 }

@@ -31,7 +31,7 @@ static const struct pen_param rows[] = {
 
 struct state {
     struct ray_targets targets;
-    bool on_host;
+    bool settled;
 };
 
 static void destroy(struct technique_ctx *ctx, void *state)
@@ -65,22 +65,7 @@ static bool trace(struct technique_run *run, struct pen_error *error)
         .adaptive = params->adaptive.on && run->face->extent[0] > 0,
         .seed = ray_seed(run, params->seed),
         .settle = settle};
-    struct pen_error refused = {0};
-    s->on_host = ray_on_host(run, params->backend);
-#ifdef PENUMBRA_HAVE_TRACE
-    if (s->on_host)
-        return pass_rays_host(run, &job, &s->targets, error);
-#endif
-    if (pass_rays_device(run, &job, &s->targets, &refused))
-        return true;
-#ifdef PENUMBRA_HAVE_TRACE
-    if (params->backend == BACKEND_AUTO && refused.code == PEN_TOO_BIG) {
-        s->on_host = true;
-        pen_result_warn(run->result, "Rays were traced on the CPU. %s", refused.message);
-        return pass_rays_host(run, &job, &s->targets, error);
-    }
-#endif
-    return pen_fail(error, refused.code, refused.pointer, "%s", refused.message);
+    return pass_rays(run, params->backend, &job, &s->targets, &s->settled, error);
 }
 
 static bool record(struct technique_run *run, struct pen_error *error)
@@ -90,11 +75,7 @@ static bool record(struct technique_run *run, struct pen_error *error)
     if (run->face == &run->light->faces[0] && !trace(run, error))
         return false;
     run->work_counted = true;
-    bool settled = false;
-#ifdef PENUMBRA_HAVE_TRACE
-    settled = s->on_host && ray_host_settles(run);
-#endif
-    if (!settled && !settle(run, error))
+    if (!s->settled && !settle(run, error))
         return false;
     if (!run->variance_framebuffer)
         return true;

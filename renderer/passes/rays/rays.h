@@ -9,21 +9,21 @@
 #define RAY_AIM_ERROR                                                                              \
     0x1p-7f /* px: corners lie on a grid of 1/256, so edges miss by a step or two */
 
+/* Few rays and a filter, where the host traces: see renderer/trace/denoise/denoised.h. */
+struct ray_denoising {
+    uint32_t samples, refine;
+    float budget;
+};
+
 struct ray_job {
     uint32_t samples;   /* per receiver, at most; rounded up to a power of two */
     float target_error; /* stop when the standard error is below; 0: all samples */
     uint32_t weighting; /* enum pen_trace_weighting */
     bool adaptive;      /* all samples only near receivers whose pre-test is mixed */
     uint32_t seed;
+    const struct ray_denoising *denoising; /* instead of all these rays; NULL: no */
     /* Turns targets into vis, for an estimate that is to be seen (passes/draw/show.h). */
     bool (*settle)(struct technique_run *run, struct pen_error *error);
-};
-
-/* Few rays on the host, and a filter: see renderer/trace/denoise/denoised.h. */
-struct ray_denoising {
-    uint32_t samples, refine;
-    float budget;
-    uint32_t seed;
 };
 
 /* What a light's rays leave, and room to work in; kept between frames. Zero to start. */
@@ -45,14 +45,11 @@ float ray_aim_error(const struct technique_run *run);
 bool ray_receivers(struct technique_run *run, struct ray_targets *targets, struct pen_error *error);
 
 /* Fill targets->visibility and, the host where somebody asks, standard_error, and count rays and
- * receivers into run->result. The host fills vis instead where ray_host_settles: of one face. */
+ * receivers into run->result. The host fills vis instead where ray_host_settles. */
+bool pass_rays_device(struct technique_run *run, const struct ray_job *job,
+    struct ray_targets *targets, struct pen_error *error);
 #ifdef PENUMBRA_HAVE_TRACE
 bool pass_rays_host(struct technique_run *run, const struct ray_job *job,
     struct ray_targets *targets, struct pen_error *error);
-bool ray_host_settles(const struct technique_run *run);
-/* Fills vis, for all faces. */
-bool pass_rays_denoised(
-    struct technique_run *run, const struct ray_denoising *how, struct pen_error *error);
+bool ray_host_settles(const struct technique_run *run, const struct ray_job *job);
 #endif
-bool pass_rays_device(struct technique_run *run, const struct ray_job *job,
-    struct ray_targets *targets, struct pen_error *error);

@@ -94,6 +94,11 @@ static enum pen_trace_step step(void *context, uint32_t done, uint32_t total)
     return steps[pass_step(w->run, done, total)];
 }
 
+bool ray_host_settles(const struct technique_run *run, const struct ray_job *job)
+{
+    return job->denoising || run->light->face_count == 1;
+}
+
 static void write_target(const struct technique_run *run, struct gl_target *target, GLenum format,
     GLenum layout, const float *from)
 {
@@ -111,7 +116,7 @@ static void write_result(const struct waiting *w)
 {
     struct technique_run *run = w->run;
     const struct pen_trace_result *result = w->result;
-    if (ray_host_settles(run))
+    if (ray_host_settles(run, w->job))
         settle_on_host(w, result->visibility);
     else
         write_target(run, &w->targets->visibility, GL_RGBA32F, GL_RGBA, result->visibility);
@@ -123,7 +128,7 @@ static bool show(void *context)
 {
     struct waiting *w = context;
     size_t bytes = (size_t)w->run->width * w->run->height * 16;
-    if (ray_host_settles(w->run))
+    if (ray_host_settles(w->run, w->job))
         w->seen = memcpy(pen_alloc(bytes, 1), w->result->visibility, bytes);
     else
         write_result(w);
@@ -192,97 +197,109 @@ static struct pen_trace_job make_job(
     return job;
 }
 
-bool ray_host_settles(const struct technique_run *run)
+/* A light's rays under way. */
+struct work {
+    struct waiting waiting;
+    struct pen_trace_scene *scene;
+    struct pen_trace_light light;
+    struct pen_trace_job job;
+    struct pen_trace_stats stats;
+    struct host_picture picture;
+    float *emission;
+};
+
+static bool begin(struct work *w, struct technique_run *run, const struct ray_job *job,
+    struct ray_targets *targets, struct pen_error *error)
 {
-    return run->light->face_count == 1;
+    *w = (struct work){.scene = trace_scene(run, error)};
+    if (!w->scene)
+        return false;
+    w->waiting = (struct waiting){run, job, targets, NULL, &w->picture, error};
+    w->light = ray_light(run);
+    w->emission = read_emission(run, &w->light);
+    w->job = make_job(run, &w->picture, &w->waiting);
+    w->job.seed = job->seed;
+    gl_timer_begin(&run->ctx->timer, PEN_STAGE_TECHNIQUE, "read back");
+    host_picture_read(run, &w->picture);
+    gl_timer_end(&run->ctx->timer);
+    gl_timer_begin(&run->ctx->timer, PEN_STAGE_TECHNIQUE, "trace");
+    return true;
+}
+
+static void end_rays(struct work *w, bool ok)
+{
+    struct technique_run *run = w->waiting.run;
+    gl_timer_end(&run->ctx->timer);
+    count_memory(run, w->scene);
+    run->result->rays += ok ? w->stats.rays : 0;
+    run->result->full_work_pixels += ok ? (uint32_t)w->stats.full_receivers : 0;
+}
+
+/* Rays alone: many of them, shown on the way. */
+static bool gather(struct work *w)
+{
+    struct technique_run *run = w->waiting.run;
+    const struct ray_job *job = w->waiting.job;
+    size_t count = (size_t)run->width * run->height;
+    float *visibility = pen_alloc(count, 16), *standard_error = pen_alloc(count, 4);
+    struct pen_trace_result result = {.visibility = visibility,
+        .standard_error = run->variance_framebuffer ? standard_error : NULL};
+    struct kept_sum *kept = open_kept(run, job);
+    struct pen_trace_kept *gathered = kept ? kept->own : NULL;
+    w->waiting.result = &result;
+    w->job.samples = job->samples;
+    w->job.target_error = job->target_error;
+    w->job.weighting = job->weighting;
+    w->job.adaptive = job->adaptive;
+    if (w->job.turn) {
+        w->job.step = step;
+        w->job.show = show;
+        w->job.shown = shown;
+    }
+    if (kept) { /* it is the job's now */
+        kept->own = NULL;
+        kept->samples = 0;
+        w->job.kept = &gathered;
+    }
+    bool ok =
+        pen_trace_visibility(w->scene, &w->light, &w->job, &result, &w->stats, w->waiting.error);
+    end_rays(w, ok);
+    if (kept) {
+        kept->own = gathered;
+        kept->samples = pen_trace_kept_samples(gathered);
+    }
+    if (ok)
+        write_result(&w->waiting);
+    free(w->waiting.seen);
+    free(visibility);
+    free(standard_error);
+    return ok;
+}
+
+static bool denoise(struct work *w)
+{
+    struct technique_run *run = w->waiting.run;
+    const struct ray_denoising *how = w->waiting.job->denoising;
+    uint16_t *halves = pen_alloc((size_t)run->width * run->height, 4 * sizeof *halves);
+    w->job.samples = how->samples;
+    bool ok = pen_trace_denoised(w->scene, &w->light, &w->job,
+        &(struct pen_trace_denoising){how->refine, how->budget}, halves, &w->stats,
+        w->waiting.error);
+    end_rays(w, ok);
+    if (ok)
+        host_picture_write(run, halves);
+    free(halves);
+    return ok;
 }
 
 bool pass_rays_host(struct technique_run *run, const struct ray_job *job, struct ray_targets *t,
     struct pen_error *error)
 {
-    struct pen_trace_scene *scene = trace_scene(run, error);
-    if (!scene)
+    struct work w;
+    if (!begin(&w, run, job, t, error))
         return false;
-    size_t count = (size_t)run->width * run->height;
-    struct host_picture picture;
-    float *visibility = pen_alloc(count, 16), *standard_error = pen_alloc(count, 4);
-    struct pen_trace_light light = ray_light(run);
-    float *emission = read_emission(run, &light);
-    bool wants_error = run->variance_framebuffer != 0;
-    struct pen_trace_result result = {
-        .visibility = visibility, .standard_error = wants_error ? standard_error : NULL};
-    struct waiting waiting = {run, job, t, &result, &picture, error};
-    struct pen_trace_job trace = make_job(run, &picture, &waiting);
-    trace.samples = job->samples;
-    trace.target_error = job->target_error;
-    trace.weighting = job->weighting;
-    trace.adaptive = job->adaptive;
-    trace.seed = job->seed;
-    if (trace.turn) {
-        trace.step = step;
-        trace.show = show;
-        trace.shown = shown;
-    }
-    struct pen_trace_stats stats;
-    struct kept_sum *kept = open_kept(run, job);
-    struct pen_trace_kept *gathered = kept ? kept->own : NULL;
-    if (kept) { /* it is the job's now */
-        kept->own = NULL;
-        kept->samples = 0;
-        trace.kept = &gathered;
-    }
-    host_picture_read(run, &picture);
-    gl_timer_begin(&run->ctx->timer, PEN_STAGE_TECHNIQUE, "trace");
-    bool ok = pen_trace_visibility(scene, &light, &trace, &result, &stats, error);
-    gl_timer_end(&run->ctx->timer);
-    count_memory(run, scene);
-    if (kept) {
-        kept->own = gathered;
-        kept->samples = pen_trace_kept_samples(gathered);
-    }
-    if (ok) {
-        write_result(&waiting);
-        run->result->rays += stats.rays;
-        run->result->full_work_pixels += (uint32_t)stats.full_receivers;
-    }
-    host_picture_finish(&picture);
-    free(waiting.seen);
-    free(visibility);
-    free(standard_error);
-    free(emission);
-    return ok && pass_turn(run->ctx, error);
-}
-
-bool pass_rays_denoised(
-    struct technique_run *run, const struct ray_denoising *how, struct pen_error *error)
-{
-    struct pen_trace_scene *scene = trace_scene(run, error);
-    struct waiting waiting = {.run = run, .error = error};
-    struct host_picture picture;
-    struct pen_trace_stats stats;
-    if (!scene)
-        return false;
-    uint16_t *halves = pen_alloc((size_t)run->width * run->height, 4 * sizeof *halves);
-    struct pen_trace_light light = ray_light(run);
-    float *emission = read_emission(run, &light);
-    struct pen_trace_job job = make_job(run, &picture, &waiting);
-    job.samples = how->samples;
-    job.seed = how->seed;
-    gl_timer_begin(&run->ctx->timer, PEN_STAGE_TECHNIQUE, "read back");
-    host_picture_read(run, &picture);
-    gl_timer_end(&run->ctx->timer);
-    gl_timer_begin(&run->ctx->timer, PEN_STAGE_TECHNIQUE, "trace");
-    bool ok = pen_trace_denoised(scene, &light, &job,
-        &(struct pen_trace_denoising){how->refine, how->budget}, halves, &stats, error);
-    gl_timer_end(&run->ctx->timer);
-    count_memory(run, scene);
-    if (ok) {
-        host_picture_write(run, halves);
-        run->result->rays += stats.rays;
-        run->result->full_work_pixels += (uint32_t)stats.full_receivers;
-    }
-    host_picture_finish(&picture);
-    free(halves);
-    free(emission);
+    bool ok = job->denoising ? denoise(&w) : gather(&w);
+    host_picture_finish(&w.picture);
+    free(w.emission);
     return ok && pass_turn(run->ctx, error);
 }

@@ -95,6 +95,7 @@ uint64_t pen_renderer_gpu_bytes(const struct pen_renderer *r)
 bool pen_renderer_load_scene(
     struct pen_renderer *r, const uint8_t id[PEN_ID_BYTES], int fd, struct pen_error *error)
 {
+    pen_renderer_drop_views(r); /* a scene of this id may have been another */
     return residency_load(&r->residency, id, fd, error);
 }
 
@@ -389,6 +390,13 @@ bool pen_renderer_render(struct pen_renderer *r, const struct pen_request *reque
 void pen_renderer_drop_shadows(struct pen_renderer *r)
 {
     shadow_cache_trim(r->ctx.shadows, 0);
+    pen_renderer_drop_views(r);
+}
+
+void pen_renderer_drop_views(struct pen_renderer *r)
+{
+    for (uint32_t i = 0; i < PEN_MAX_RENDERS; i++)
+        frame_targets_forget(&r->renders[i].lane.targets);
 }
 
 bool pen_renderer_is_lost(struct pen_renderer *r)

@@ -84,8 +84,9 @@ bool pen_render_advance(struct pen_render *render, double ms);
 struct pen_place pen_render_place(const struct pen_render *render);
 /* As pen_renderer_render; one that has not ended gives up at once and fails with PEN_LOST. */
 bool pen_render_end(struct pen_render *render, struct pen_error *error);
-/* Forgets every shadow input, so that the next render pays for its own. */
+/* Forgets every shadow input and what cameras saw, so that the next render pays for its own. */
 void pen_renderer_drop_shadows(struct pen_renderer *renderer);
+void pen_renderer_drop_views(struct pen_renderer *renderer); /* the second alone */
 /* True when the GL context was lost; the worker then exits and is replaced. */
 bool pen_renderer_is_lost(struct pen_renderer *renderer);
 

@@ -87,6 +87,14 @@ struct technique_ctx {
     uint64_t shadow_budget;  /* the share of one face of one light in it; set for every frame */
 };
 
+/* All that a drawing of it depends on; zeroed: nothing is known. */
+struct gbuffer_view {
+    uint8_t scene[PEN_ID_BYTES];
+    uint32_t known, kind, ground, number, width, height;
+    int32_t animation, variant;
+    float time_s, world_to_clip[16], eye[3], ground_albedo[3];
+};
+
 struct gbuffer {
     struct gl_target depth;    /* D32F, reversed, 0: background */
     struct gl_target normal;   /* RGBA16: octahedral geometric normal, octahedral shading normal */
@@ -94,6 +102,8 @@ struct gbuffer {
     struct gl_target surface;  /* RGBA8: roughness, metallic, occlusion, specular scale */
     struct gl_target emission; /* R11G11B10F; only when the scene has any */
     GLuint framebuffer;        /* of all of them */
+    struct gbuffer_view shown; /* what it holds, from frame to frame */
+    uint64_t triangles;        /* that were drawn for it */
 };
 
 /* What the frame does with an estimate that is not complete. */

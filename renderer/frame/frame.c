@@ -362,6 +362,7 @@ static bool draw(
     f->sky_known = false;
     f->layer = pass.kind == GBUFFER_LAYER;
     pass.ground = !f->layer && job->request->ground.on;
+    pass.ground_albedo = job->request->ground_albedo;
     return pass_gbuffer(job->ctx, job->scene, &f->view, &pass, g, &f->triangles, error);
 }
 

@@ -9,6 +9,11 @@ static void finish_gbuffer(struct gbuffer *g)
     gl.DeleteFramebuffers(1, &g->framebuffer);
 }
 
+void frame_targets_forget(struct frame_targets *t)
+{
+    t->gbuffer.shown.known = t->layer.shown.known = 0;
+}
+
 void frame_targets_finish(struct frame_targets *t)
 {
     struct gl_target *targets[] = {&t->layer_before, &t->front_depth, &t->front_normal,

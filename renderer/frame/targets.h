@@ -32,4 +32,5 @@ struct frame_targets {
 };
 /* Makes a sum fit the request's picture and start at 0. */
 void frame_fit_sum(struct gl_target *target, GLenum format, const struct pen_request *request);
+void frame_targets_forget(struct frame_targets *targets); /* what was seen is drawn anew */
 void frame_targets_finish(struct frame_targets *targets); /* zeroed: nothing happens */

@@ -164,6 +164,7 @@ static bool measure(struct pen_renderer *renderer, struct pen_request *request,
         if (o->moving_light)
             for (uint32_t l = 0; l < request->light_count; l++)
                 request->lights[l].position[1] += 1e-4f;
+        pen_renderer_drop_views(renderer); /* as if the camera moved */
         if (!pen_renderer_render(renderer, request, &frame, &result, error))
             return false;
         pen_frame_finish(&frame);

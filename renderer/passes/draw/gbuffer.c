@@ -29,6 +29,26 @@ static bool fit(
     return true;
 }
 
+/* Not of layers, which depend on depths besides. */
+static struct gbuffer_view make_view(const struct technique_ctx *ctx, const struct scene *scene,
+    const struct view *view, const struct gbuffer_pass *how)
+{
+    struct gbuffer_view v;
+    memset(&v, 0, sizeof v); /* is compared as bytes */
+    if (how->kind == GBUFFER_LAYER)
+        return v;
+    memcpy(v.scene, scene->id, sizeof v.scene);
+    v.known = 1, v.kind = how->kind, v.ground = how->ground;
+    v.number = scene->has_blend ? ctx->turns.frame : 0;
+    v.width = view->width, v.height = view->height;
+    v.animation = scene->pose.animation, v.variant = scene->pose.variant;
+    v.time_s = scene->pose.time_s;
+    memcpy(v.world_to_clip, view->world_to_clip, sizeof v.world_to_clip);
+    memcpy(v.eye, view->eye, sizeof v.eye);
+    memcpy(v.ground_albedo, how->ground_albedo, sizeof v.ground_albedo);
+    return v;
+}
+
 static GLuint program(struct technique_ctx *ctx, const char *use, bool emission,
     enum gbuffer_kind kind, struct pen_error *error)
 {
@@ -77,7 +97,15 @@ bool pass_gbuffer(struct technique_ctx *ctx, struct scene *scene, const struct v
     const struct gbuffer_pass *how, struct gbuffer *g, uint64_t *triangles, struct pen_error *error)
 {
     bool emission = scene->has_emission || scene->has_unlit;
-    if (fit(g, view->width, view->height, emission, how->kind) && !pass_turn(ctx, error))
+    struct gbuffer_view wanted = make_view(ctx, scene, view, how);
+    bool made = fit(g, view->width, view->height, emission, how->kind);
+    if (!made && wanted.known && !memcmp(&wanted, &g->shown, sizeof wanted)) {
+        *triangles += g->triangles;
+        return true;
+    }
+    g->shown.known = 0;
+    g->triangles = 0;
+    if (made && !pass_turn(ctx, error))
         return false;
     struct scene_pass pass = {.full = true, .blended = how->kind == GBUFFER_LAYER};
     pass.opaque = program(ctx, "", emission, GBUFFER_HASHED, error);
@@ -98,9 +126,12 @@ bool pass_gbuffer(struct technique_ctx *ctx, struct scene *scene, const struct v
             gl.BindTextureUnit(UNIT_SOLID, how->solid->name);
             gl.ProgramUniform1i(pass.textured, LOCATION_LAST, how->last);
         }
-        *triangles += draw_piece(ctx, scene, view, &pass, how->ground ? flat : 0, &bands, g);
+        g->triangles += draw_piece(ctx, scene, view, &pass, how->ground ? flat : 0, &bands, g);
         ok = pass_bands_next(ctx, &bands, &more, error);
     }
     gl_timer_end(&ctx->timer);
+    *triangles += g->triangles;
+    if (ok)
+        g->shown = wanted;
     return ok && pass_turn(ctx, error);
 }

@@ -11,12 +11,14 @@ enum gbuffer_kind {
 struct gbuffer_pass {
     enum gbuffer_kind kind;
     bool ground;
+    const float *ground_albedo; /* RGB */
     /* Of a layer. It is the nearest behind `before`, in front of `solid`; depths. */
     const struct gl_texture *before, *solid;
     bool last; /* a share alpha of all that lie behind `before`, without alpha */
 };
 
-/* The G-buffer of the frame. */
+/* The G-buffer of the frame. One that holds the same view of the same scene, but for layers, is taken
+ * as it is: then there is no pass "gbuffer". */
 bool pass_gbuffer(struct technique_ctx *ctx, struct scene *scene, const struct view *view,
     const struct gbuffer_pass *pass, struct gbuffer *gbuffer, uint64_t *triangles,
     struct pen_error *error);

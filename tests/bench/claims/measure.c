@@ -110,6 +110,7 @@ static bool time_one(struct plan_variant *variant, const struct pen_result *firs
         /* The automatic light of a scene in millimetres is stronger than a request may ask for. */
         request.lights[i].power_w = fminf(request.lights[i].power_w, 1e9f);
     }
+    pen_renderer_drop_views(renderer); /* as if the camera moved */
     if (!pen_renderer_render(renderer, &request, &frame, &result, &variant->error)) {
         variant->status = VARIANT_FAILED;
         return false;

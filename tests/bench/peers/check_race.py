@@ -68,6 +68,8 @@ class Pictures(unittest.TestCase):
         self.assertEqual([round(v) for v in a[:3]], [1, 0, 0])
         self.assertEqual(shadows.agreement(a, a), 1)
         self.assertAlmostEqual(shadows.agreement(a, b), 1 / 3)
+        pale = shadows.visible(grey([[200, 160, 160, 0]]), plain)
+        self.assertEqual(shadows.agreement(a, pale), 1)
 
     def test_error(self):
         a, b = grey([[10, 10], [10, 10]]), grey([[10, 61], [10, 10]])

@@ -32,6 +32,7 @@ light = vtk.vtkLight()
 light.SetLightTypeToSceneLight()
 light.SetPositional(True)
 light.SetConeAngle(60)
+light.SetExponent(0)
 light.SetAttenuationValues(1, 0, 0)
 renderer.AddLight(light)
 for actor in renderer.GetActors():  # its shadow pass knows no physically based materials

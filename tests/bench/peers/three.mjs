@@ -49,7 +49,8 @@ async function pageOf(query) {
       if (line.type() === "error") console.error("console:", line.text().slice(0, 1000));
     });
     await page.setViewport({ width: Number(query.width) + 50, height: Number(query.height) + 50 });
-    await page.goto(`http://127.0.0.1:${server.address().port}/three.html?${key}`);
+    await page.goto(`http://127.0.0.1:${server.address().port}/three.html?${key}`,
+                    { timeout: 600000 });
     await page.waitForFunction("window.ready === true", { timeout: 600000, polling: 10 });
     const about = JSON.stringify(await page.evaluate(() => window.about));
     pages.set(key, { page, about });

@@ -87,13 +87,14 @@ bool lane_advance(struct lane *lane, double ms)
     struct gl_account *before = gl_textures_charge(lane->charged);
     lane->ended = gl_fiber_resume(lane->fiber);
     lane->charged = gl_textures_charge(before);
-    GLsync *left[] = {&turns->fence, &turns->under_way.fence};
-    for (int i = 0; lane->ended && i < 2; i++)
-        if (*left[i]) {
-            gl.DeleteSync(*left[i]);
-            *left[i] = NULL;
-        }
-    return lane->ended;
+    if (!lane->ended)
+        return false;
+    while (turns->pieces)
+        gl.DeleteSync(turns->under_way[--turns->pieces].fence);
+    if (turns->fence)
+        gl.DeleteSync(turns->fence);
+    turns->fence = NULL;
+    return true;
 }
 
 void lane_cancel(struct lane *lane)

@@ -26,10 +26,14 @@ struct technique_piece {
     GLsync fence; /* NULL: there is none */
     uint64_t kind;
     double units;   /* of technique_speed; < 0: it tells nothing of others */
+    bool follows;   /* it begins when the one before ends */
     uint32_t waits; /* gl_waits when it was handed over */
     double away_ms; /* of technique_turns, then */
     struct gl_stopwatch since;
 };
+
+/* More than these are not handed over before the first of them is done. */
+#define TECHNIQUE_PIECES 3
 
 /* A frame in progress gives way to others between two pieces of work (passes/draw/turn.h). */
 struct technique_turns {
@@ -46,7 +50,8 @@ struct technique_turns {
     bool stopped; /* it was */
     bool held;    /* what is under way must not be interrupted */
     GLsync fence; /* of the last piece but one */
-    struct technique_piece under_way;
+    struct technique_piece under_way[TECHNIQUE_PIECES]; /* the first one first */
+    uint32_t pieces;
     /* Called before and after others have the turn; NULL: nothing goes on that should not then. */
     void (*away)(void *context, bool is);
     void *away_context;

@@ -1,6 +1,7 @@
 #include "renderer/passes/draw/turn.h"
 #include <cglm/cglm.h>
 #include <math.h>
+#include <string.h>
 
 #define BAND_PIXELS_ON_GPU (1u << 24)
 #define BAND_ROWS 64 /* of a software rasteriser's tiles */
@@ -152,22 +153,25 @@ void pass_bands_begin(struct technique_ctx *ctx, struct pass_bands *bands, uint3
     begin_piece(bands);
 }
 
-/* Until what is under way is done. As pass_hand_over. */
+/* Until the first of what is under way is done. As pass_hand_over. */
 static double catch_up(struct technique_ctx *ctx)
 {
     struct technique_turns *turns = &ctx->turns;
-    struct technique_piece *piece = &turns->under_way;
-    if (!piece->fence)
+    struct technique_piece piece = turns->under_way[0], *next = turns->under_way;
+    gl.ClientWaitSync(piece.fence, GL_SYNC_FLUSH_COMMANDS_BIT, UINT64_MAX);
+    gl.DeleteSync(piece.fence);
+    turns->pieces--;
+    memmove(next, next + 1, turns->pieces * sizeof *next);
+    if (turns->pieces && next->follows) {
+        next->since = gl_stopwatch_start();
+        next->away_ms = turns->away_ms;
+    }
+    if (piece.waits != gl_waits() || piece.units < 0)
         return 0;
-    gl.ClientWaitSync(piece->fence, GL_SYNC_FLUSH_COMMANDS_BIT, UINT64_MAX);
-    gl.DeleteSync(piece->fence);
-    piece->fence = NULL;
-    if (piece->waits != gl_waits() || piece->units < 0)
-        return 0;
-    double ms = fmax(gl_stopwatch_ms(&piece->since) - (turns->away_ms - piece->away_ms), 1e-3);
-    if (piece->units > 0) {
-        struct technique_speed *speed = pass_speed(ctx, piece->kind);
-        speed->ms = fmax(ms / piece->units, REMEMBERED * speed->ms);
+    double ms = fmax(gl_stopwatch_ms(&piece.since) - (turns->away_ms - piece.away_ms), 1e-3);
+    if (piece.units > 0) {
+        struct technique_speed *speed = pass_speed(ctx, piece.kind);
+        speed->ms = fmax(ms / piece.units, REMEMBERED * speed->ms);
     }
     return ms;
 }
@@ -182,17 +186,18 @@ double pass_hand_over(struct technique_ctx *ctx, uint64_t kind, double units,
         .kind = kind,
         .units = units,
         .waits = gl_waits(),
+        .away_ms = turns->away_ms,
         .since = *since};
-    bool follows = turns->under_way.fence && turns->under_way.waits == piece.waits;
-    double ms = catch_up(ctx);
+    const struct technique_piece *before = turns->under_way + turns->pieces - 1;
+    piece.follows = turns->pieces && before->waits == piece.waits;
     wait |= units > 0 && pass_speed(ctx, kind)->ms == 0;
-    if (follows)
-        piece.since = gl_stopwatch_start(); /* it begins when that ends */
-    else if (!wait)
+    if (!piece.follows && !wait)
         piece.units = -1; /* it ends unseen while the next one is handed over */
-    piece.away_ms = turns->away_ms;
-    turns->under_way = piece;
-    return wait ? catch_up(ctx) : ms;
+    turns->under_way[turns->pieces++] = piece;
+    double ms = 0;
+    while (turns->pieces == TECHNIQUE_PIECES || (wait && turns->pieces))
+        ms = catch_up(ctx);
+    return ms;
 }
 
 /* The piece at hand is drawn: learns how long such pieces take, and how much is to be drawn at once from

@@ -20,12 +20,12 @@ void pass_bind_counts(struct technique_ctx *ctx, GLuint buffer);
 /* What was measured of a kind of work; of one that is not known yet 0, in place of another. */
 struct technique_speed *pass_speed(struct technique_ctx *ctx, uint64_t kind);
 
-/* In software two pieces are under way at a time, so that nobody waits for who hands them over, and each is to
- * last so much of a turn. */
-#define PASS_PIECE_SHARE 0.6
+/* In software several pieces are under way at a time, so that nobody waits for who hands them over, and each is
+ * to last so much of a turn. */
+#define PASS_PIECE_SHARE 0.5
 /* Hands over what was drawn since, `units` of a kind, or < 0 when that tells nothing of others, and
- * waits for what was handed over before, and, `wait`, for this as well; learns from it. Returns what a
- * piece took, ms; 0: not known. Elsewhere than in software it is nothing. */
+ * waits until fewer than TECHNIQUE_PIECES are under way, or, `wait`, none; learns from those that are done.
+ * Returns what the last of them took, ms; 0: not known. Elsewhere than in software it is nothing. */
 double pass_hand_over(struct technique_ctx *ctx, uint64_t kind, double units,
     const struct gl_stopwatch *since, bool wait);
 

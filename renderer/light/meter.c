@@ -8,6 +8,16 @@ static float luminance(const float c[3])
     return 0.2126f * c[0] + 0.7152f * c[1] + 0.0722f * c[2];
 }
 
+#define BEAM 0.67f /* of its middle: a grey object is not burnt out there */
+
+/* What a spot's cone leaves of it; as shade.frag has it. */
+static float in_cone(const struct pen_light *spot, float cosine)
+{
+    float inner = cosf(glm_rad(spot->inner_cone_deg)), outer = cosf(glm_rad(spot->outer_cone_deg));
+    float share = glm_clamp((cosine - outer) / fmaxf(inner - outer, 1e-4f), 0, 1);
+    return share * share;
+}
+
 /* Irradiance of one light on a surface at p; negative where the normal points away. An emitter with
  * an extent counts as a point of the same flux, kept from growing without bound near itself: a meter
  * needs no more. */
@@ -33,7 +43,7 @@ static float irradiance(const struct light *light, const float p[3], const float
         area = GLM_PIf * s->radius * s->radius;
         break;
     case PEN_LIGHT_SPOT:
-        value *= emitted > cosf(glm_rad(s->outer_cone_deg));
+        value *= in_cone(s, emitted);
         break;
     default:
         break;
@@ -63,12 +73,44 @@ static float level_of(float *found, uint32_t count)
     return 4.0f / 3 * found[dark + (count - dark - 1) * 4 / 5] / GLM_PIf;
 }
 
+/* Irradiance in the middle of a spot's beam, of what faces it, where it passes nearest to the content's
+ * middle: few samples or none lie in a narrow one. 0: it passes by. */
+static float in_the_beam(
+    const struct light *light, const struct outline_samples *samples, vec3 middle, float radius)
+{
+    vec3 to, at, back;
+    if (light->source->type != PEN_LIGHT_SPOT || !samples->count)
+        return 0;
+    glm_vec3_sub(middle, (float *)light->origin, to);
+    float along = glm_vec3_dot(to, (float *)light->z);
+    bool ahead = along > 0;
+    along = fmaxf(along, radius / 4); /* not the lamp's own rim */
+    glm_vec3_scale((float *)light->z, along, at);
+    glm_vec3_add((float *)light->origin, at, at);
+    glm_vec3_negate_to((float *)light->z, back);
+    return ahead && glm_vec3_distance(at, middle) < radius ? irradiance(light, at, back) : 0;
+}
+
+/* The middle of the samples; returns how far they are from it. */
+static float extent(const struct outline_samples *samples, vec3 middle)
+{
+    float radius = 0;
+    glm_vec3_zero(middle);
+    for (uint32_t i = 0; i < samples->count; i++)
+        glm_vec3_muladds((float *)samples->at[i].point, 1.0f / (float)samples->count, middle);
+    for (uint32_t i = 0; i < samples->count; i++)
+        radius = fmaxf(radius, glm_vec3_distance((float *)samples->at[i].point, middle));
+    return radius;
+}
+
 /* The sides that turn away from a lamp are not lit, and must not count; but in many files the sign
  * of a normal says little, and sheets are seen from both sides. The brighter reading is taken. */
 static float measure(
     const struct light *lights, uint32_t count, const struct outline_samples *samples)
 {
-    float facing[OUTLINE_SAMPLES], either[OUTLINE_SAMPLES];
+    float facing[OUTLINE_SAMPLES], either[OUTLINE_SAMPLES], beam = 0;
+    vec3 middle;
+    float radius = extent(samples, middle);
     for (uint32_t i = 0; i < samples->count; i++) {
         facing[i] = either[i] = 0;
         for (uint32_t k = 0; k < count; k++) {
@@ -77,7 +119,10 @@ static float measure(
             either[i] += fabsf(e);
         }
     }
-    return fmaxf(level_of(facing, samples->count), level_of(either, samples->count));
+    for (uint32_t k = 0; k < count; k++)
+        beam = fmaxf(beam, in_the_beam(&lights[k], samples, middle, radius));
+    float level = fmaxf(level_of(facing, samples->count), level_of(either, samples->count));
+    return fmaxf(level, BEAM * beam / GLM_PIf);
 }
 
 float light_meter(
@@ -96,7 +141,7 @@ float light_meter(
 }
 
 /* What own lights leave in the dark is more of the picture than behind a key light. */
-#define FILL 1.04f
+#define FILL 1.32f
 
 /* What faces the lights squarely comes out just below white, with the sky's share on top. The key
  * light is made to measure: its level is 1. */

@@ -1,5 +1,6 @@
 /* penumbra-shot SCENE.pscene OUT.png [key=value ...]: one image without a daemon. Keys are those of
- * the GET render call; repeat=N renders N times and prints the last one's times; a scene name of
+ * the GET render call; repeat=N renders N times and prints the last one's times and, in
+ * brackets, the least of each pass; a scene name of
  * penumbra generate (square, demo, ...) instead of a file makes that scene. */
 #include "protocol/json_request.h"
 #include "renderer/blob/pscene.h"
@@ -71,14 +72,18 @@ int main(int argc, char **argv)
     static struct pen_result result;
     struct pen_frame frame = {0};
     struct pen_bytes bytes = {0};
+    static float least[PEN_MAX_PASSES];
     for (int i = 0; i < repeat; i++) {
         pen_frame_finish(&frame);
         if (!pen_renderer_render(renderer, &request, &frame, &result, &error))
             return report(&error);
+        for (uint32_t k = 0; k < result.pass_count; k++)
+            least[k] = i && least[k] < result.passes[k].ms ? least[k] : result.passes[k].ms;
     }
     for (uint32_t i = 0; i < result.pass_count; i++)
-        printf("%-10s %-22s x%-3u %8.2f ms\n", pen_stage_names[result.passes[i].stage],
-            result.passes[i].name, result.passes[i].count, (double)result.passes[i].ms);
+        printf("%-10s %-22s x%-3u %8.2f ms (%.2f)\n", pen_stage_names[result.passes[i].stage],
+            result.passes[i].name, result.passes[i].count, (double)result.passes[i].ms,
+            (double)least[i]);
     printf("class pixels %u %u %u, full work %u, triangles %u\n", result.class_pixels[0],
         result.class_pixels[1], result.class_pixels[2], result.full_work_pixels,
         result.triangles_drawn);

@@ -33,7 +33,7 @@ static bool open_job(
     bool canary = !memcmp(job->request.scene, s->canary_id, PEN_ID_BYTES);
     int fd = canary ? fcntl(s->canary_blob, F_DUPFD_CLOEXEC, 3)
                     : scene_store_open_blob(s->store, STORE_SCENES, job->request.scene, error);
-    if (fd < 0)
+    if (fd < 0) /* why the store gave none, it has said */
         return pen_fail(error, PEN_UNAVAILABLE, "", "The service is out of descriptors.");
     fds->fd[fds->count++] = fd;
     for (uint32_t i = 0; i < job->request.light_count; i++) {
@@ -164,26 +164,20 @@ static void finish_refresh(struct import_task *task)
     free(task);
 }
 
-/* Blobs of an older version, or damaged ones, are made again from their sources. */
-static void refresh_stale(struct service *s)
+/* Of an older version, or damaged: made again from its source. Workers may have it mapped. */
+static void import_again(void *context, enum store_kind kind, const uint8_t id[PEN_ID_BYTES])
 {
-    for (int kind = 0; kind < STORE_KINDS; kind++) {
-        struct store_entry entry;
-        uint8_t after[PEN_ID_BYTES];
-        for (bool first = true; scene_store_list(s->store, kind, first ? NULL : after, &entry, 1);
-             first = false) {
-            memcpy(after, entry.id, PEN_ID_BYTES);
-            if (!entry.stale)
-                continue;
-            struct import_task *task = pen_alloc_zero(1, sizeof *task);
-            struct pen_error error = {0};
-            task->kind = kind;
-            task->finish = finish_refresh;
-            memcpy(task->id, entry.id, PEN_ID_BYTES);
-            if (!importer_submit(s->importer, task, &error))
-                free(task);
-        }
+    struct service *s = context;
+    struct import_task *task = pen_alloc_zero(1, sizeof *task);
+    task->kind = kind;
+    task->finish = finish_refresh;
+    memcpy(task->id, id, PEN_ID_BYTES);
+    if (!importer_submit(s->importer, task, NULL)) {
+        scene_store_not_refreshed(s->store, kind, id, false);
+        free(task);
     }
+    if (kind == STORE_SCENES && s->pool)
+        worker_pool_drop_scene(s->pool, id);
 }
 
 static bool start_importer(struct service *s, struct pen_error *error)
@@ -199,7 +193,8 @@ static bool start_importer(struct service *s, struct pen_error *error)
             sizeof config.import_path, error))
         return false;
     s->importer = importer_create(&config);
-    refresh_stale(s);
+    scene_store_on_stale(s->store, import_again, s);
+    s->scrubber = scrubber_create(s->store, c->scrub_s);
     return true;
 }
 
@@ -345,7 +340,9 @@ void service_destroy(struct service *s, const bool *hurry)
     if (!s)
         return;
     drain(s, hurry);
-    importer_destroy(s->importer);
+    scrubber_destroy(s->scrubber);
+    if (s->importer)
+        importer_stop(s->importer);
     if (s->admin)
         http_listener_drain(s->admin);
     if (s->scheduler)
@@ -353,6 +350,7 @@ void service_destroy(struct service *s, const bool *hurry)
     http_listener_destroy(s->listener);
     http_listener_destroy(s->admin);
     worker_pool_destroy(s->pool);
+    importer_destroy(s->importer); /* the pool's threads may still have asked for imports */
     scheduler_destroy(s->scheduler);
     result_cache_destroy(s->cache);
     result_cache_destroy(s->part_cache);

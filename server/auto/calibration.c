@@ -214,7 +214,7 @@ bool calibration_save(struct scene_store *store, const uint8_t scene[PEN_ID_BYTE
     size_t bytes = strlen(content);
     fd = openat(folder, part, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0600);
     ok = fd >= 0 && write(fd, content, bytes) == (ssize_t)bytes && !fsync(fd) &&
-         !renameat(folder, part, folder, name);
+         file_replace(folder, part, folder, name);
 done:
     if (fd >= 0)
         close(fd);

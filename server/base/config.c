@@ -60,6 +60,8 @@ static const struct row rows[] = {
         .help = "Renders that may wait; beyond it the answer is 503."),
     ROW(client_share, "48", .max = 65536,
         .help = "Renders that one client may have under way; beyond it 429. 0: no limit."),
+    ROW(scrub_s, "86400", .form = "SECONDS", .max = 31536000,
+        .help = "How often all that is stored is read and checked, in idle time; 0: never."),
     ROW(result_cache, "256M", SIZE, .help = "Memory for encoded images; 0: keep none."),
     ROW(hang_timeout_ms, "60000", TIME,
         .help = "A worker that has work and gives no sign of life for so long is replaced, or "

@@ -2,6 +2,9 @@
 #include "protocol/memory.h"
 #include <openssl/evp.h>
 #include <stdlib.h>
+#include <unistd.h>
+
+#define PIECE (1u << 18)
 
 struct hash {
     EVP_MD_CTX *context;
@@ -35,4 +38,19 @@ void hash_destroy(struct hash *hash)
         return;
     EVP_MD_CTX_free(hash->context);
     free(hash);
+}
+
+bool hash_file(int fd, uint8_t digest[PEN_ID_BYTES])
+{
+    struct hash *hash = hash_create();
+    void *piece = pen_alloc(1, PIECE);
+    off_t at = 0;
+    ssize_t n;
+    while ((n = pread(fd, piece, PIECE, at)) > 0) {
+        hash_add(hash, piece, (size_t)n);
+        at += n;
+    }
+    free(piece);
+    hash_finish(hash, digest);
+    return !n;
 }

@@ -3,7 +3,7 @@
 #pragma once
 #include "protocol/routes.h"
 #include "server/routes/context.h"
-#include "server/store/upload.h"
+#include "server/uploads/upload.h"
 
 #define ROUTES_BUSY_S 2 /* until another upload may find room */
 

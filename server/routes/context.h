@@ -7,7 +7,8 @@
 #include "server/http/auth.h"
 #include "server/http/http.h"
 #include "server/queue/scheduler.h"
-#include "server/store/importer.h"
+#include "server/uploads/importer.h"
+#include "server/store/scrubber.h"
 #include "server/store/result_cache.h"
 #include "server/store/scene_store.h"
 #include "server/workers/worker_pool.h"
@@ -19,6 +20,7 @@ struct service {
     const struct pen_catalogue *catalogue;
     struct scene_store *store;
     struct importer *importer;
+    struct scrubber *scrubber;
     struct scheduler *scheduler;
     struct worker_pool *pool;
     struct result_cache *cache, *part_cache; /* pictures; those that got better since */

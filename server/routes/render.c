@@ -81,11 +81,8 @@ bool routes_check_store(
     struct call *call, const struct pen_request *request, struct pen_error *error)
 {
     struct service *s = call->service;
-    struct store_entry entry;
-    if (!scene_store_find(s->store, STORE_SCENES, request->scene, &entry))
-        return pen_fail(error, PEN_NOT_FOUND, "", "There is no such scene.");
-    if (entry.stale)
-        return pen_fail(error, PEN_UNAVAILABLE, "", "The scene is being imported again.");
+    if (!scene_store_is_ready(s->store, STORE_SCENES, request->scene, error))
+        return false;
     for (uint32_t i = 0; i < request->light_count; i++) {
         const struct pen_light *light = &request->lights[i];
         char pointer[40];

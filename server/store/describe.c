@@ -8,7 +8,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 #include <unistd.h>
 
 #define MAX_META (4u << 20)
@@ -24,14 +23,14 @@ static uint64_t gpu_bytes(const struct psc_header *header)
     return bytes;
 }
 
-static char *describe_scene(
-    const struct psc_scene *scene, const uint8_t id[PEN_ID_BYTES], uint64_t source_bytes)
+static char *describe_scene(const struct psc_scene *scene, const uint8_t id[PEN_ID_BYTES],
+    uint64_t source_bytes, int64_t stored_unix_s)
 {
     struct pen_scene_info info = {
         .source_bytes = source_bytes,
         .blob_bytes = scene->header->file_bytes,
         .gpu_bytes = gpu_bytes(scene->header),
-        .stored_unix_s = time(NULL),
+        .stored_unix_s = stored_unix_s,
         .vertices = scene->vertex_count,
         .primitives = scene->primitive_count,
         .instances = scene->instance_count,
@@ -91,7 +90,7 @@ static char *describe_scene(
 }
 
 char *describe_blob(enum store_kind kind, const uint8_t id[PEN_ID_BYTES], int blob_fd,
-    uint64_t source_bytes, struct pen_error *error)
+    uint64_t source_bytes, int64_t stored_unix_s, struct pen_error *error)
 {
     struct psc_scene scene;
     char *text = NULL;
@@ -100,13 +99,13 @@ char *describe_blob(enum store_kind kind, const uint8_t id[PEN_ID_BYTES], int bl
     if (memcmp(scene.header->source, id, PEN_ID_BYTES)) {
         pen_fail(error, PEN_INTERNAL, "", "The importer mixed up two uploads.");
     } else if (kind == STORE_SCENES) {
-        text = describe_scene(&scene, id, source_bytes);
+        text = describe_scene(&scene, id, source_bytes, stored_unix_s);
     } else if (scene.image_count != 1) {
         pen_fail(error, PEN_INVALID, "", "The upload holds no image.");
     } else {
         struct pen_image_info info = {.source_bytes = source_bytes,
             .blob_bytes = scene.header->file_bytes,
-            .stored_unix_s = time(NULL),
+            .stored_unix_s = stored_unix_s,
             .width = scene.images[0].width,
             .height = scene.images[0].height};
         memcpy(info.id, id, PEN_ID_BYTES);
@@ -116,25 +115,54 @@ char *describe_blob(enum store_kind kind, const uint8_t id[PEN_ID_BYTES], int bl
     return text;
 }
 
-char *describe_stored(struct scene_store *store, enum store_kind kind,
-    const uint8_t id[PEN_ID_BYTES], bool resident, struct pen_error *error)
+static cJSON *read_meta(struct scene_store *store, enum store_kind kind,
+    const uint8_t id[PEN_ID_BYTES], struct pen_error *error)
 {
     size_t bytes;
     int fd = scene_store_open_meta(store, kind, id, error);
-    if (fd < 0)
-        return NULL;
-    char *text = file_read(fd, MAX_META, &bytes);
+    char *text = fd >= 0 ? file_read(fd, MAX_META, &bytes) : NULL;
     cJSON *root = text ? cJSON_ParseWithLength(text, bytes) : NULL;
-    close(fd);
+    if (fd >= 0)
+        close(fd);
     free(text);
-    if (!cJSON_IsObject(root)) {
-        cJSON_Delete(root);
-        pen_fail(error, PEN_UNAVAILABLE, "", "The store could not be read.");
+    if (cJSON_IsObject(root))
+        return root;
+    cJSON_Delete(root);
+    pen_fail(error, PEN_UNAVAILABLE, "", "The store could not be read.");
+    return NULL;
+}
+
+/* From the blob, if that is as it was. */
+static bool mend_meta(struct scene_store *store, enum store_kind kind,
+    const uint8_t id[PEN_ID_BYTES], struct pen_error *error)
+{
+    struct store_entry entry;
+    int blob = scene_store_open_blob(store, kind, id, error);
+    if (blob < 0)
+        return false;
+    char *text = scene_store_find(store, kind, id, &entry)
+                     ? describe_blob(kind, id, blob, entry.source_bytes, entry.stored_unix_s, error)
+                     : NULL;
+    bool ok = text && scene_store_mend_meta(store, kind, id, text);
+    free(text);
+    close(blob);
+    return ok || pen_fail(error, PEN_UNAVAILABLE, "", "The store could not be written.");
+}
+
+char *describe_stored(struct scene_store *store, enum store_kind kind,
+    const uint8_t id[PEN_ID_BYTES], bool resident, struct pen_error *error)
+{
+    struct pen_error damage = {0};
+    cJSON *root = read_meta(store, kind, id, &damage);
+    if (!root && damage.code == PEN_UNAVAILABLE && mend_meta(store, kind, id, error))
+        root = read_meta(store, kind, id, error);
+    if (!root) {
+        pen_fail(error, damage.code, "", "%s", damage.message);
         return NULL;
     }
     if (kind == STORE_SCENES)
         cJSON_ReplaceItemInObjectCaseSensitive(root, "resident", cJSON_CreateBool(resident));
-    text = cJSON_PrintUnformatted(root);
+    char *text = cJSON_PrintUnformatted(root);
     cJSON_Delete(root);
     if (!text)
         abort();

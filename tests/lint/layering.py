@@ -53,7 +53,7 @@ RULES = [
 # ending) in it. A file may include what lies in its own folder or on a floor below, not its
 # neighbours on the same floor.
 FLOORS = {
-    "server": [["base"], ["http", "store", "pages"], ["queue"], ["workers"], ["auto"], ["routes"],
+    "server": [["base"], ["http", "store", "pages"], ["queue", "uploads"], ["workers"], ["auto"], ["routes"],
                [""]],
     "renderer": [
         ["device", "picture", "shared", "shaders/*", "metrics", "catalogue/catalogue"],

@@ -1,5 +1,5 @@
 /* Form bodies cut in every way, against what was put in; and broken ones. */
-#include "server/store/multipart.h"
+#include "server/uploads/multipart.h"
 #include "tests/unit/check.h"
 
 static struct {

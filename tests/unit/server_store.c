@@ -1,8 +1,9 @@
 /* The store: complete or not there, across openings, damage and leftovers. */
 #include "protocol/request.h"
 #include "renderer/blob/builder.h"
+#include "server/base/hash.h"
 #include "server/store/scene_store.h"
-#include "server/store/upload.h"
+#include "server/uploads/upload.h"
 #include "tests/unit/check.h"
 #include <dirent.h>
 #include <fcntl.h>
@@ -18,9 +19,37 @@ static void write_file(int folder, const char *name, const void *data, size_t by
     close(fd);
 }
 
-/* A folder as the importer leaves it. */
-static void fill(const struct store_staging *staging, const uint8_t id[PEN_ID_BYTES])
+/* Five sources of six bytes, and their ids in order. */
+static char sources[5][8];
+static uint8_t ids[5][PEN_ID_BYTES];
+
+static int by_id(const void *a, const void *b)
 {
+    uint8_t x[PEN_ID_BYTES], y[PEN_ID_BYTES];
+    struct hash *hash[2] = {hash_create(), hash_create()};
+    hash_add(hash[0], a, 6);
+    hash_add(hash[1], b, 6);
+    hash_finish(hash[0], x);
+    hash_finish(hash[1], y);
+    return memcmp(x, y, PEN_ID_BYTES);
+}
+
+static void make_sources(void)
+{
+    for (int i = 0; i < 5; i++)
+        snprintf(sources[i], sizeof sources[i], "six %02d", i);
+    qsort(sources, 5, sizeof *sources, by_id);
+    for (int i = 0; i < 5; i++) {
+        struct hash *hash = hash_create();
+        hash_add(hash, sources[i], 6);
+        hash_finish(hash, ids[i]);
+    }
+}
+
+/* A folder as the importer leaves it. */
+static void fill(const struct store_staging *staging, int which)
+{
+    const uint8_t *id = ids[which];
     struct psc_builder *builder = psc_builder_create();
     struct psc_material material = psc_material_default();
     void *data;
@@ -28,7 +57,7 @@ static void fill(const struct store_staging *staging, const uint8_t id[PEN_ID_BY
     psc_builder_add_material(builder, &material);
     CHECK(psc_builder_finish(builder, id, &data, &bytes, NULL));
     psc_builder_destroy(builder);
-    write_file(staging->folder, STORE_SOURCE, "source", 6);
+    write_file(staging->folder, STORE_SOURCE, sources[which], 6);
     write_file(staging->folder, "scene.pscene", data, bytes);
     write_file(staging->folder, STORE_META, "{}", 2);
     free(data);
@@ -55,23 +84,28 @@ static void test_life(void)
     bool added;
     CHECK(store != NULL);
     CHECK(!scene_store_open(root, &error) && error.code == PEN_UNAVAILABLE); /* one at a time */
-    for (uint8_t i = 1; i <= 5; i++) {
-        uint8_t id[PEN_ID_BYTES] = {(uint8_t)(10 * (6 - i))};
+    for (int i = 4; i >= 0; i--) {
         CHECK(scene_store_stage(store, &staging, NULL));
-        fill(&staging, id);
-        CHECK(scene_store_commit(store, STORE_SCENES, &staging, id, &added, NULL) && added);
+        fill(&staging, i);
+        CHECK(scene_store_commit(store, STORE_SCENES, &staging, ids[i], &added, NULL) && added);
     }
-    uint8_t twenty[PEN_ID_BYTES] = {20}, after[PEN_ID_BYTES] = {25};
+    const uint8_t *twenty = ids[1];
+    uint8_t after[PEN_ID_BYTES]; /* between the second and the third */
+    memcpy(after, ids[1], sizeof after);
+    after[PEN_ID_BYTES - 1]++;
     CHECK(scene_store_stage(store, &staging, NULL));
-    fill(&staging, twenty);
+    fill(&staging, 1);
     CHECK(scene_store_commit(store, STORE_SCENES, &staging, twenty, &added, NULL) && !added);
     CHECK(count_files("tmp") == 0);
     struct store_entry list[8];
     CHECK(scene_store_list(store, STORE_SCENES, NULL, list, 8) == 5);
     for (int i = 0; i < 5; i++)
-        CHECK(list[i].id[0] == 10 * (i + 1) && list[i].source_bytes == 6 && !list[i].stale);
-    CHECK(scene_store_list(store, STORE_SCENES, twenty, list, 2) == 2 && list[0].id[0] == 30);
-    CHECK(scene_store_list(store, STORE_SCENES, after, list, 8) == 3 && list[0].id[0] == 30);
+        CHECK(!memcmp(list[i].id, ids[i], PEN_ID_BYTES) && list[i].source_bytes == 6 &&
+              !list[i].stale);
+    CHECK(scene_store_list(store, STORE_SCENES, twenty, list, 2) == 2 &&
+          !memcmp(list[0].id, ids[2], PEN_ID_BYTES));
+    CHECK(scene_store_list(store, STORE_SCENES, after, list, 8) == 3 &&
+          !memcmp(list[0].id, ids[2], PEN_ID_BYTES));
     CHECK(scene_store_list(store, STORE_IMAGES, NULL, list, 8) == 0);
     int fd = scene_store_open_blob(store, STORE_SCENES, twenty, NULL);
     struct psc_scene scene;
@@ -86,7 +120,7 @@ static void test_life(void)
     CHECK(!scene_store_find(store, STORE_SCENES, twenty, &entry));
     CHECK(scene_store_count(store, STORE_SCENES) == 4 && count_files("tmp") == 0);
     CHECK(scene_store_stage(store, &staging, NULL)); /* and then the machine goes down */
-    fill(&staging, twenty);
+    fill(&staging, 1);
     close(staging.folder);
     scene_store_close(store);
 }
@@ -94,13 +128,18 @@ static void test_life(void)
 static void test_reopening(void)
 {
     char path[256], hex[PEN_ID_HEX + 1];
-    uint8_t ten[PEN_ID_BYTES] = {10}, thirty[PEN_ID_BYTES] = {30}, forty[PEN_ID_BYTES] = {40};
+    const uint8_t *ten = ids[0], *thirty = ids[2], *forty = ids[3];
     CHECK(count_files("tmp") == 1);
     pen_id_to_hex(ten, hex); /* a blob that was cut */
     snprintf(path, sizeof path, "%s/scenes/%s/scene.pscene", root, hex);
     CHECK(truncate(path, 100) == 0);
     pen_id_to_hex(thirty, hex); /* a source that is lost */
     snprintf(path, sizeof path, "%s/scenes/%s/source", root, hex);
+    CHECK(unlink(path) == 0);
+    pen_id_to_hex(ids[4], hex); /* both */
+    snprintf(path, sizeof path, "%s/scenes/%s/source", root, hex);
+    CHECK(unlink(path) == 0);
+    snprintf(path, sizeof path, "%s/scenes/%s/scene.pscene", root, hex);
     CHECK(unlink(path) == 0);
     snprintf(path, sizeof path, "%s/scenes/not-a-scene", root);
     CHECK(mkdir(path, 0700) == 0);
@@ -110,15 +149,24 @@ static void test_reopening(void)
     CHECK(store && count_files("tmp") == 0);
     CHECK(scene_store_count(store, STORE_SCENES) == 3);
     CHECK(scene_store_find(store, STORE_SCENES, ten, &entry) && entry.stale);
-    CHECK(!scene_store_find(store, STORE_SCENES, thirty, &entry));
+    /* A blob without its source is drawn, but not sound; without both, it is not listed. */
+    CHECK(scene_store_find(store, STORE_SCENES, thirty, &entry) && !entry.stale);
+    CHECK(!scene_store_is_sound(store, STORE_SCENES, thirty));
+    CHECK(!scene_store_find(store, STORE_SCENES, ids[4], &entry) && count_files("damaged") == 1);
     CHECK(scene_store_find(store, STORE_SCENES, forty, &entry) && !entry.stale);
     CHECK(scene_store_open_blob(store, STORE_SCENES, ten, &error) < 0 &&
           error.code == PEN_UNAVAILABLE);
     struct store_staging staging;
     CHECK(scene_store_stage(store, &staging, NULL));
-    fill(&staging, ten);
+    fill(&staging, 0);
     CHECK(scene_store_refresh(store, STORE_SCENES, &staging, ten, NULL));
     CHECK(scene_store_find(store, STORE_SCENES, ten, &entry) && !entry.stale);
+    CHECK(scene_store_is_sound(store, STORE_SCENES, ten));
+    bool added; /* what is not sound is replaced */
+    CHECK(scene_store_stage(store, &staging, NULL));
+    fill(&staging, 2);
+    CHECK(scene_store_commit(store, STORE_SCENES, &staging, thirty, &added, NULL) && added);
+    CHECK(scene_store_is_sound(store, STORE_SCENES, thirty));
     CHECK(count_files("tmp") == 0);
     scene_store_close(store);
 }
@@ -145,8 +193,41 @@ static void test_uploads(void)
     scene_store_close(store);
 }
 
+/* The check values of CRC-64 of ECMA-182 as xz has it, from its specification. */
+static void test_sums(void)
+{
+    char path[] = "/tmp/penumbra-sums-XXXXXX", text[80];
+    CHECK(mkdtemp(path) != NULL);
+    int folder = open(path, O_RDONLY | O_DIRECTORY);
+    write_file(folder, "nine", "123456789", 9);
+    const char *const names[] = {"nine"};
+    CHECK(sums_write(folder, names, 1));
+    int fd = openat(folder, STORE_SUMS, O_RDONLY);
+    ssize_t n = read(fd, text, sizeof text - 1);
+    close(fd);
+    text[n > 0 ? n : 0] = 0;
+    CHECK(!strcmp(text, "995dc9bbdf1939fa 9 nine\n"));
+    struct sums_mark mark = {0};
+    fd = openat(folder, "nine", O_RDWR);
+    CHECK(sums_are_right(folder, "nine", fd, &mark) && mark.bytes == 9);
+    CHECK(!sums_are_right(folder, "ten", fd, NULL));
+    CHECK(pwrite(fd, "0", 1, 4) == 1);
+    CHECK(!sums_are_right(folder, "nine", fd, NULL));
+    CHECK(pwrite(fd, "5", 1, 4) == 1);
+    CHECK(sums_are_right(folder, "nine", fd, &mark));
+    CHECK(ftruncate(fd, 8) == 0);
+    CHECK(!sums_are_right(folder, "nine", fd, &mark));
+    close(fd);
+    unlinkat(folder, "nine", 0);
+    unlinkat(folder, STORE_SUMS, 0);
+    close(folder);
+    rmdir(path);
+}
+
 int main(void)
 {
+    make_sources();
+    test_sums();
     CHECK(mkdtemp(root) != NULL);
     test_life();
     test_reopening();

@@ -1,8 +1,9 @@
-#include "server/store/importer.h"
+#include "server/uploads/importer.h"
 #include "protocol/memory.h"
 #include "protocol/request.h"
 #include "renderer/import/import_process.h"
 #include "server/base/clock.h"
+#include "server/base/hash.h"
 #include "server/store/describe.h"
 #include "server/base/log.h"
 #include "server/base/process.h"
@@ -15,6 +16,7 @@
 #include <string.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
+#include <time.h>
 #include <unistd.h>
 
 #define MAX_PROCESSES 64
@@ -134,7 +136,8 @@ static bool import(struct importer *importer, struct import_task *task,
         pen_fail(error, PEN_UNAVAILABLE, "", "The store could not be written.");
     ok = ok && run_process(importer, task, source_fd, blob_fd, error);
     if (ok)
-        meta = describe_blob(task->kind, task->id, blob_fd, (uint64_t)status.st_size, error);
+        meta = describe_blob(
+            task->kind, task->id, blob_fd, (uint64_t)status.st_size, time(NULL), error);
     ok = ok && meta;
     if (ok && !write_meta(staging->folder, meta))
         ok = pen_fail(error, PEN_UNAVAILABLE, "", "The store could not be written.");
@@ -159,8 +162,7 @@ static void add_upload(struct importer *importer, struct import_task *task)
         return;
     }
     memcpy(task->id, id, PEN_ID_BYTES);
-    struct store_entry entry;
-    if (scene_store_find(store, task->kind, id, &entry) && !entry.stale)
+    if (scene_store_is_sound(store, task->kind, id))
         return;
     int source_fd = openat(staging->folder, STORE_SOURCE, O_RDONLY | O_CLOEXEC);
     if (import(importer, task, staging, source_fd))
@@ -169,20 +171,37 @@ static void add_upload(struct importer *importer, struct import_task *task)
         close(source_fd);
 }
 
+/* The source is what its id says, or the entry is lost: what it was made of is gone. */
+static bool check_source(struct importer *importer, struct import_task *task, int source_fd)
+{
+    uint8_t digest[PEN_ID_BYTES];
+    if (source_fd >= 0 && !hash_file(source_fd, digest))
+        return pen_fail(&task->error, PEN_UNAVAILABLE, "", "The store could not be read.");
+    if (source_fd >= 0 && !memcmp(digest, task->id, PEN_ID_BYTES))
+        return true;
+    bool lost = source_fd >= 0 || task->error.code == PEN_NOT_FOUND;
+    if (lost)
+        scene_store_lose(importer->config.store, task->kind, task->id);
+    return pen_fail(&task->error, PEN_NOT_FOUND, "", "Its source is damaged, too.");
+}
+
 static void refresh(struct importer *importer, struct import_task *task)
 {
     struct scene_store *store = importer->config.store;
     struct store_staging staging;
     int source_fd = scene_store_open_source(store, task->kind, task->id, &task->error);
-    if (source_fd < 0)
-        return;
-    if (scene_store_stage(store, &staging, &task->error)) {
+    if (check_source(importer, task, source_fd) &&
+        scene_store_stage(store, &staging, &task->error)) {
         if (import(importer, task, &staging, source_fd))
             scene_store_refresh(store, task->kind, &staging, task->id, &task->error);
         else
             scene_store_discard(store, &staging);
     }
-    close(source_fd);
+    if (task->error.code)
+        scene_store_not_refreshed(
+            store, task->kind, task->id, pen_code_blame(task->error.code) == PEN_BLAME_CALLER);
+    if (source_fd >= 0)
+        close(source_fd);
 }
 
 static void *run(void *argument)
@@ -264,17 +283,23 @@ void importer_cancel(struct importer *importer)
     pthread_mutex_unlock(&importer->lock);
 }
 
+void importer_stop(struct importer *importer)
+{
+    importer_cancel(importer);
+    pthread_mutex_lock(&importer->lock);
+    bool runs = !importer->stopping;
+    importer->stopping = true;
+    pthread_cond_broadcast(&importer->work);
+    pthread_mutex_unlock(&importer->lock);
+    for (uint32_t i = 0; runs && i < importer->config.processes; i++)
+        pthread_join(importer->threads[i], NULL);
+}
+
 void importer_destroy(struct importer *importer)
 {
     if (!importer)
         return;
-    importer_cancel(importer);
-    pthread_mutex_lock(&importer->lock);
-    importer->stopping = true;
-    pthread_cond_broadcast(&importer->work);
-    pthread_mutex_unlock(&importer->lock);
-    for (uint32_t i = 0; i < importer->config.processes; i++)
-        pthread_join(importer->threads[i], NULL);
+    importer_stop(importer);
     pthread_mutex_destroy(&importer->lock);
     pthread_cond_destroy(&importer->work);
     free(importer);

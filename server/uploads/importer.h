@@ -1,7 +1,7 @@
 /* Runs penumbra-import: a few processes at a time, each with a time limit, and files what they make
  * in the store. */
 #pragma once
-#include "server/store/upload.h"
+#include "server/uploads/upload.h"
 
 struct import_task {
     struct import_task *next;
@@ -29,7 +29,9 @@ struct importer *importer_create(const struct importer_config *config);
 bool importer_submit(struct importer *importer, struct import_task *task, struct pen_error *error);
 /* Kills what runs; everything under way fails with PEN_UNAVAILABLE. */
 void importer_cancel(struct importer *importer);
-void importer_destroy(struct importer *importer);
+/* Cancels, and ends its threads: every task has been finished, and importer_submit refuses. */
+void importer_stop(struct importer *importer);
+void importer_destroy(struct importer *importer); /* NULL is fine */
 
 struct importer_numbers {
     uint32_t waiting, running;

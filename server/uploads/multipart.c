@@ -1,4 +1,4 @@
-#include "server/store/multipart.h"
+#include "server/uploads/multipart.h"
 #include "protocol/memory.h"
 #include <stdio.h>
 #include <stdlib.h>

@@ -1,8 +1,8 @@
-#include "server/store/upload.h"
+#include "server/uploads/upload.h"
 #include "protocol/memory.h"
 #include "renderer/import/names.h"
 #include "server/base/hash.h"
-#include "server/store/multipart.h"
+#include "server/uploads/multipart.h"
 #include <errno.h>
 #include <fcntl.h>
 #include <stdio.h>

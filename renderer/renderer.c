@@ -399,6 +399,11 @@ void pen_renderer_drop_views(struct pen_renderer *r)
         frame_targets_forget(&r->renders[i].lane.targets);
 }
 
+bool pen_renderer_is_called(const struct pen_renderer *r)
+{
+    return r->ctx.is_called && r->ctx.is_called(r->ctx.call_context);
+}
+
 bool pen_renderer_is_lost(struct pen_renderer *r)
 {
     return r->lost || gl.GetGraphicsResetStatus() != GL_NO_ERROR;

@@ -87,6 +87,8 @@ bool pen_render_end(struct pen_render *render, struct pen_error *error);
 /* Forgets every shadow input and what cameras saw, so that the next render pays for its own. */
 void pen_renderer_drop_shadows(struct pen_renderer *renderer);
 void pen_renderer_drop_views(struct pen_renderer *renderer); /* the second alone */
+/* As config.is_called says; false without it. */
+bool pen_renderer_is_called(const struct pen_renderer *renderer);
 /* True when the GL context was lost; the worker then exits and is replaced. */
 bool pen_renderer_is_lost(struct pen_renderer *renderer);
 
@@ -95,5 +97,6 @@ enum pen_warm_up {
     PEN_WARM_ALL    /* and every method with its defaults */
 };
 /* Compiles and runs programs in tiny pictures of built-in scenes, so that the first real request is
- * not slower than the tenth. Returns the milliseconds it took. */
+ * not slower than the tenth. The usual request's end early where somebody calls, who would wait for
+ * what may not be his own. Returns the milliseconds it took. */
 double pen_renderer_warm_up(struct pen_renderer *renderer, enum pen_warm_up how_much);

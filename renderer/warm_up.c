@@ -4,6 +4,7 @@
 #include "renderer/generate/generate.h"
 #include "renderer/gl/timer.h"
 #include "renderer/renderer.h"
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
@@ -11,7 +12,8 @@
 
 #define TRIANGLES 64
 #define MAP_TEXELS 256
-#define SAMPLES 32 /* rays want more than those of their pre-test, or it is left out */
+#define ENDLESS_MS 1e9 /* in pieces, between which it is asked who calls */
+#define SAMPLES 32     /* rays want more than those of their pre-test, or it is left out */
 
 static void set(struct pen_request *request, const struct pen_technique_info *method,
     const char *name, double value)
@@ -21,8 +23,9 @@ static void set(struct pen_request *request, const struct pen_technique_info *me
         pen_param_store(row, request->technique_params, &value, "", NULL);
 }
 
-static void run_method(
-    struct pen_renderer *r, const uint8_t *scene, const struct pen_technique_info *method)
+/* gives_way: where somebody calls, it is left as it is. */
+static void run_method(struct pen_renderer *r, const uint8_t *scene,
+    const struct pen_technique_info *method, bool gives_way)
 {
     struct pen_request request;
     struct pen_result result;
@@ -36,7 +39,11 @@ static void run_method(
     set(&request, method, "map_size", MAP_TEXELS);
     set(&request, method, "samples", SAMPLES);
     request.width = 64, request.height = 48;
-    if (pen_renderer_render(r, &request, &frame, &result, NULL))
+    struct pen_render *render = pen_render_begin(r, &request, &frame, &result, NULL);
+    while (render && !pen_render_advance(render, gives_way ? ENDLESS_MS : INFINITY) &&
+           !(gives_way && pen_renderer_is_called(r)))
+        ;
+    if (render && pen_render_end(render, NULL))
         pen_frame_finish(&frame);
 }
 
@@ -79,14 +86,17 @@ double pen_renderer_warm_up(struct pen_renderer *r, enum pen_warm_up how_much)
     const struct pen_catalogue *catalogue = pen_renderer_catalogue();
     struct pen_request usual;
     pen_request_default(&usual, catalogue);
+    bool usual_only = how_much == PEN_WARM_USUAL;
     double begin = gl_now_ms();
     for (uint32_t k = 0; k < sizeof kinds / sizeof *kinds; k++) {
         uint8_t scene[PEN_ID_BYTES];
+        if (usual_only && pen_renderer_is_called(r))
+            break;
         if (!load_generated(r, kinds[k], k == 0, scene))
             continue;
         for (uint32_t i = 0; i < catalogue->count; i++)
-            if (how_much == PEN_WARM_ALL || !strcmp(catalogue->items[i]->name, usual.technique))
-                run_method(r, scene, catalogue->items[i]);
+            if (!usual_only || !strcmp(catalogue->items[i]->name, usual.technique))
+                run_method(r, scene, catalogue->items[i], usual_only);
         pen_renderer_drop_scene(r, scene);
     }
     return gl_now_ms() - begin;

@@ -11,8 +11,14 @@
 #define CHANNEL_MAX_FDS (2 + PEN_MAX_LIGHTS)
 
 /* --warm-up N: what the worker compiles before it is asked for it. FILL: everything, into the driver's
- * cache of compiled shaders; it then exits, and has no channel. */
-enum worker_warm_up { WORKER_NO_WARM_UP, WORKER_WARM_UP_USUAL, WORKER_WARM_UP_FILL };
+ * cache of compiled shaders, when nothing else is to be done, or NOW; it then exits, and has no
+ * channel. */
+enum worker_warm_up {
+    WORKER_NO_WARM_UP,
+    WORKER_WARM_UP_USUAL,
+    WORKER_WARM_UP_FILL,
+    WORKER_WARM_UP_FILL_NOW
+};
 
 enum channel_kind {
     CHANNEL_HELLO = 1, /* worker: the context stands */

@@ -263,10 +263,10 @@ static int serve(struct worker *worker)
     }
 }
 
-/* Whoever renders goes first. */
-static int fill_cache(const struct pen_renderer_config *config)
+static int fill_cache(const struct pen_renderer_config *config, bool gives_way)
 {
-    setpriority(PRIO_PROCESS, 0, 19);
+    if (gives_way) /* whoever renders goes first */
+        setpriority(PRIO_PROCESS, 0, 19);
     struct pen_renderer *renderer = pen_renderer_create(config, NULL);
     if (!renderer)
         return EXIT_REFUSED;
@@ -296,8 +296,8 @@ int main(int argc, char **argv)
         else if (!strcmp(argv[i], "--warm-up"))
             what = (enum worker_warm_up)value;
     }
-    if (what == WORKER_WARM_UP_FILL)
-        return fill_cache(&config);
+    if (what == WORKER_WARM_UP_FILL || what == WORKER_WARM_UP_FILL_NOW)
+        return fill_cache(&config, what == WORKER_WARM_UP_FILL);
     static struct channel_message hello;
     struct pen_error error = {0};
     uint64_t start = clock_now_ns();

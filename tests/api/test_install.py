@@ -22,7 +22,7 @@ class Install(unittest.TestCase):
     def setUpClass(cls):
         cls.folder = tempfile.mkdtemp(prefix="penumbra-install-")
         there = os.path.join(cls.folder, "first")
-        output("cmake", "--install", BUILD, "--prefix", there)
+        cls.said = output("cmake", "--install", BUILD, "--prefix", there)
         cls.prefix = os.path.join(cls.folder, "moved")
         os.rename(there, cls.prefix)
         harness.BIN = os.path.join(cls.prefix, "bin")
@@ -53,6 +53,10 @@ class Install(unittest.TestCase):
         self.assertEqual(d.get("/v1").json()["version"], VERSION)
         self.assertEqual(d.get("/openapi.json").json()["info"]["version"], VERSION)
         self.assertEqual(d.stop(), 0)
+
+    def test_shaders(self):
+        """The first start is to be as quick as the next ones."""
+        self.assertIn("Shaders are in the driver's cache", self.said)
 
     def test_versions(self):
         self.assertEqual(output(self.path("bin", "penumbra"), "version"), "penumbra %s\n" % VERSION)

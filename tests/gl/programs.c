@@ -1,5 +1,5 @@
 /* The programs that a renderer keeps: what makes a new one, what leaves, and that neither changes a
- * picture. Arguments: "taps", "bound", "warm" or "rows [METHOD]",
+ * picture. Arguments: "taps", "bound", "warm", "called" or "rows [METHOD]",
  * a part of it. */
 #include "renderer/technique.h"
 #include "tests/gl/fixture.h"
@@ -209,6 +209,33 @@ static void check_warm(void)
     }
 }
 
+static bool calls_later(void *context)
+{
+    uint32_t *questions = context;
+    return !*questions || !--*questions;
+}
+
+/* How many programs the usual warm-up compiles when somebody calls at the n-th question. */
+static uint32_t warmed_until(uint32_t questions)
+{
+    struct pen_renderer_config config = {.is_called = calls_later, .call_context = &questions};
+    struct pen_error error = {0};
+    struct pen_renderer *r = pen_renderer_create(&config, &error);
+    CHECK(r != NULL);
+    pen_renderer_warm_up(r, PEN_WARM_USUAL);
+    uint32_t compiled = pen_renderer_programs(r).compiled;
+    pen_renderer_destroy(r);
+    return compiled;
+}
+
+/* Nobody waits behind it. */
+static void check_warm_gives_way(void)
+{
+    uint32_t none = warmed_until(0), some = warmed_until(4), all = warmed_until(UINT32_MAX);
+    printf("warmed up: %u, %u, %u programs\n", none, some, all);
+    CHECK(none < some && some < all);
+}
+
 int main(int argc, char **argv)
 {
     struct pen_renderer *r = make(0);
@@ -221,6 +248,8 @@ int main(int argc, char **argv)
         check_bound();
     if (argc < 2 || !strcmp(argv[1], "warm"))
         check_warm();
+    if (argc < 2 || !strcmp(argv[1], "called"))
+        check_warm_gives_way();
     if (argc < 2 || !strcmp(argv[1], "rows"))
         check_rows(argc > 2 ? argv[2] : NULL);
     CHECK_DONE();

@@ -93,6 +93,9 @@ static const struct row rows[] = {
     ROW(insecure, "off", .help = "Listen beyond loopback without tokens."),
     ROW(cors_origin, "", .form = "ORIGIN",
         .help = "Origin that pages may call from, or *; empty: none."),
+    ROW(allow_host, "", .form = "NAMES",
+        .help = "Names that this service is called by, with commas, or * for any. Addresses, "
+                "names without a dot and the machine's own are always taken."),
     ROW(worker_path, "", FILE_NAME, .help = "penumbra-worker; empty: next to penumbrad."),
     ROW(import_path, "", FILE_NAME, .help = "penumbra-import; empty: next to penumbrad."),
     ROW(log_format, "text", .choices = log_format_names, .help = "Form of the log, on stderr."),

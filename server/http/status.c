@@ -19,6 +19,8 @@ struct http_status http_status_of(enum pen_code code)
         ROW(UNAVAILABLE, 503, "Service Unavailable", true);
         ROW(DEADLINE, 504, "Gateway Timeout", true);
         ROW(UNAUTHORIZED, 401, "Unauthorized", false);
+        ROW(FORBIDDEN, 403, "Forbidden", false);
+        ROW(MISDIRECTED, 421, "Misdirected Request", false);
         ROW(TOO_MANY, 429, "Too Many Requests", true);
         ROW(TIMEOUT, 408, "Request Timeout", true);
         ROW(METHOD_NOT_ALLOWED, 405, "Method Not Allowed", false);

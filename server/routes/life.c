@@ -3,11 +3,13 @@
 #include "protocol/memory.h"
 #include "server/base/clock.h"
 #include "server/base/log.h"
+#include "server/http/guard.h"
 #include "server/routes/routes.h"
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+static enum step_end guard(struct call *call, struct pen_error *error);
 static enum step_end find(struct call *call, struct pen_error *error);
 static enum step_end authorise(struct call *call, struct pen_error *error);
 static enum step_end admit(struct call *call, struct pen_error *error);
@@ -19,6 +21,7 @@ static enum step_end bury(struct call *call, struct pen_error *error);
 
 static const struct step life[] = {
     /* The header is there, and properly framed. */
+    {"guard", guard},         /* whom it is meant for, and which page sends it */
     {"find", find},           /* the address; answers OPTIONS of other origins */
     {"authorise", authorise}, /* the token, and whose share it uses */
     {"admit", admit},         /* the body: of the right type and size, an upload finds a place */
@@ -38,6 +41,20 @@ static bool (*const handlers[PEN_ROUTES])(struct call *call, struct pen_error *e
 #define ENDPOINT(id, ...) [PEN_ROUTE_##id] = route_##id,
 #include "protocol/endpoints.def"
 };
+
+static enum step_end guard(struct call *call, struct pen_error *error)
+{
+    struct http_exchange *x = call->exchange;
+    const struct config *config = call->service->config;
+    const struct guard own = {config->allow_host, config->cors_origin};
+    const struct guard_request request = {.method = x->method,
+        .host = http_header(x, "Host"),
+        .origin = http_header(x, "Origin"),
+        .site = http_header(x, "Sec-Fetch-Site"),
+        .authorization = http_header(x, "Authorization")};
+    return guard_host(&own, request.host, error) && guard_page(&own, &request, error) ? STEP_NEXT
+                                                                                      : STEP_FAILED;
+}
 
 static enum step_end find(struct call *call, struct pen_error *error)
 {

@@ -91,6 +91,39 @@ class Framing(unittest.TestCase):
                 self.one_refusal(method + b" /v1 HTTP/1.1\r\n" + HOST + b"Content-Length: %d\r\n\r\n"
                                  % len(SMUGGLED) + SMUGGLED)
 
+    def test_names_of_others(self):
+        """A name that leads here though nobody here has it: somebody's page asks (DNS rebinding)."""
+        for host, status in (("evil.example:%d" % self.d.port, 421), ("a:b", 400), ("", 400),
+                             ("localhost:%d" % self.d.port, 200), ("[::1]", 200)):
+            with self.subTest(host=host):
+                answer = self.d.call("GET", "/v1", headers={"Host": host})
+                self.assertEqual(answer.status, status, answer.body)
+                if status != 200:
+                    self.assertEqual(answer.headers["Content-Type"], "application/problem+json")
+
+    def test_pages_of_others(self):
+        """What a foreign page can send without being asked: forms and bodies without a type."""
+        render = "/v1/scenes/%s/render" % self.id
+        form = {"Content-Type": "multipart/form-data; boundary=x"}
+        body = b'--x\r\nContent-Disposition: form-data; name="a"; filename="a.glb"\r\n\r\nx\r\n--x--\r\n'
+        foreign = ({"Origin": "http://evil.example"}, {"Origin": "null"},
+                   {"Origin": "http://evil.example", "Sec-Fetch-Site": "cross-site"},
+                   {"Sec-Fetch-Site": "cross-site"},
+                   {"Origin": "http://127.0.0.1:%d" % (self.d.port + 1), "Sec-Fetch-Site": "same-site"})
+        for head in foreign:
+            with self.subTest(head=head):
+                self.assertEqual(self.d.call("POST", "/v1/scenes", body, {**form, **head}).status, 403)
+                self.assertEqual(self.d.call("POST", render, b"{}", head).status, 403)
+                self.assertEqual(self.d.call("DELETE", "/v1/scenes/" + self.id, headers=head).status,
+                                 403)
+                shown = self.d.call("GET", render + "?technique=none&width=32&height=32", headers=head)
+                self.assertEqual(shown.status, 200)  # pictures may be embedded
+        own = {"Origin": "http://127.0.0.1:%d" % self.d.port}
+        for head in (own, {**own, "Sec-Fetch-Site": "same-origin"}, {}):
+            answer = self.d.call("POST", render, b'{"technique":{"name":"none"},"width":32,"height":32}',
+                                 {"Content-Type": "application/json", **head})
+            self.assertEqual(answer.status, 200, answer.body)
+
     def test_hosts_and_versions(self):
         self.one_refusal(b"GET /v1 HTTP/1.1\r\n\r\n" + SMUGGLED)
         self.one_refusal(b"GET /v1 HTTP/1.1\r\nHost: a\r\nHost: b\r\n\r\n" + SMUGGLED)

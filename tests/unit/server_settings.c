@@ -2,6 +2,7 @@
 #include "protocol/request.h"
 #include "server/http/accept.h"
 #include "server/http/auth.h"
+#include "server/http/guard.h"
 #include "server/http/status.h"
 #include "server/base/config.h"
 #include "server/workers/quarantine.h"
@@ -150,6 +151,65 @@ static void test_auth(void)
     close(fd);
 }
 
+static void test_hosts(void)
+{
+    static const char *const good[] = {"127.0.0.1", "127.0.0.1:8080", "192.0.2.7", "[::1]:80",
+        "localhost", "localhost:8080", "a.localhost", "penumbra:80", "render.local", "X.Internal:1",
+        "renders.example.com", "Renders.Example.Com.:443", "b.example", NULL};
+    static const char *const bad[] = {"evil.example", "localhost.evil.example:8080",
+        "127.0.0.1.evil.example", "xrenders.example.com", "renders.example.com.evil.net",
+        "local.evil.net", "renders.example", NULL};
+    static const char *const odd[] = {
+        "", ":80", "a:b", "[::1", "[::1]x", "[evil.example]", ".", NULL};
+    const struct guard some = {"renders.example.com, b.example", ""}, any = {"*", ""};
+    for (int i = 0; good[i]; i++)
+        CHECK(guard_host(&some, good[i], NULL));
+    for (int i = 0; bad[i]; i++) {
+        struct pen_error error = {0};
+        CHECK(!guard_host(&some, bad[i], &error) && error.code == PEN_MISDIRECTED);
+        CHECK(guard_host(&any, bad[i], NULL));
+    }
+    for (int i = 0; odd[i]; i++) {
+        struct pen_error error = {0};
+        CHECK(!guard_host(&some, odd[i], &error) && error.code == PEN_MALFORMED);
+    }
+    CHECK(guard_host(&some, NULL, NULL));
+}
+
+static void test_pages(void)
+{
+    const struct guard none = {"", ""}, known = {"renders.example.com", "https://a.example"},
+                       open = {"*", "*"};
+    const struct {
+        struct guard_request request;
+        bool none, known, open;
+    } rows[] = {
+        {{"POST", "h:1", NULL, NULL, NULL}, true, true, true}, /* no browser */
+        {{"POST", "h:1", "http://h:1", NULL, NULL}, true, true, true},
+        {{"POST", "h:1", "http://h:2", NULL, NULL}, false, false, true},
+        {{"POST", "h:1", "null", NULL, NULL}, false, false, true},
+        {{"POST", "h:1", "https://a.example", NULL, NULL}, false, true, true},
+        {{"POST", "h:1", "https://a.example.evil.net", NULL, NULL}, false, false, true},
+        {{"POST", "h:1", "https://renders.example.com", NULL, NULL}, false, true, true},
+        {{"POST", "h:1", "http://h:1", "same-origin", NULL}, true, true, true},
+        {{"POST", "h:1", "https://elsewhere", "same-origin", NULL}, true, true,
+            true}, /* a proxy's */
+        {{"POST", "h:1", NULL, "none", NULL}, true, true, true},
+        {{"POST", "h:1", NULL, "cross-site", NULL}, false, false, false},
+        {{"DELETE", "h:1", "http://h:2", "same-site", NULL}, false, false, true},
+        {{"PUT", "h:1", "https://a.example", "cross-site", NULL}, false, true, true},
+        {{"POST", "h:1", "http://evil.example", "cross-site", "Bearer x"}, true, true, true},
+        {{"GET", "h:1", "http://evil.example", "cross-site", NULL}, true, true, true},
+    };
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        struct pen_error error = {0};
+        CHECK(guard_page(&none, &rows[i].request, &error) == rows[i].none);
+        CHECK(error.code == (rows[i].none ? PEN_OK : PEN_FORBIDDEN));
+        CHECK(guard_page(&known, &rows[i].request, NULL) == rows[i].known);
+        CHECK(guard_page(&open, &rows[i].request, NULL) == rows[i].open);
+    }
+}
+
 static void test_quarantine(void)
 {
     struct quarantine *q = quarantine_create(100);
@@ -180,6 +240,8 @@ int main(void)
     test_accept();
     test_codes();
     test_auth();
+    test_hosts();
+    test_pages();
     test_quarantine();
     CHECK_DONE();
 }

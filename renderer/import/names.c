@@ -70,6 +70,7 @@ bool pen_name_tidy(const char *given, size_t bytes, char name[PEN_BUNDLE_MAX_NAM
 struct pen_name_keys {
     const char *name;
     char *composed, *folded; /* normal form C, and that without regard to case */
+    bool doubted;
 };
 
 /* The name itself where it is not UTF-8. */
@@ -88,8 +89,13 @@ void pen_names_init(struct pen_names *index, const char *const *names, uint32_t 
     index->count = count;
     index->keys = pen_alloc_zero(count, sizeof *index->keys);
     for (uint32_t i = 0; i < count; i++)
-        index->keys[i] =
-            (struct pen_name_keys){names[i], map(names[i], 0), map(names[i], UTF8PROC_CASEFOLD)};
+        index->keys[i] = (struct pen_name_keys){
+            names[i], map(names[i], 0), map(names[i], UTF8PROC_CASEFOLD), false};
+}
+
+void pen_names_doubt(struct pen_names *index, uint32_t number)
+{
+    index->keys[number].doubted = true;
 }
 
 void pen_names_finish(struct pen_names *index)
@@ -128,6 +134,65 @@ static int64_t look_up(const struct pen_names *index, const struct pen_name_keys
             return found;
     }
     return PEN_NAME_UNKNOWN;
+}
+
+static bool is_ascii(char c)
+{
+    return !((unsigned char)c & 0x80);
+}
+
+/* From the first letter beyond ASCII to the last one; what lies before and after it are lengths. */
+struct foreign_part {
+    size_t before, after, letters;
+};
+
+static size_t count_letters(const char *text, size_t bytes)
+{
+    size_t letters = 0;
+    for (size_t i = 0; i < bytes; i++)
+        letters += ((unsigned char)text[i] & 0xc0) != 0x80;
+    return letters;
+}
+
+static struct foreign_part foreign_part(const char *name, size_t bytes)
+{
+    struct foreign_part part = {0, 0, 0};
+    while (part.before < bytes && is_ascii(name[part.before]))
+        part.before++;
+    while (part.before + part.after < bytes && is_ascii(name[bytes - 1 - part.after]))
+        part.after++;
+    part.letters = count_letters(name + part.before, bytes - part.before - part.after);
+    return part;
+}
+
+/* A letter has up to four bytes, each of which was read as one, and the later ones may be ASCII. */
+static bool may_be(const char *name, const char *wanted, size_t length, struct foreign_part part)
+{
+    size_t bytes = strlen(name);
+    if (bytes <= part.before + part.after || is_ascii(name[part.before]) ||
+        strncmp(name, wanted, part.before) ||
+        strcmp(name + bytes - part.after, wanted + length - part.after))
+        return false;
+    size_t letters = count_letters(name + part.before, bytes - part.before - part.after);
+    return letters >= part.letters && letters <= 4 * part.letters;
+}
+
+/* The only name in doubt that may be the wanted one. */
+static int64_t look_up_doubted(const struct pen_names *index, const char *wanted)
+{
+    size_t length = strlen(wanted);
+    struct foreign_part part = foreign_part(wanted, length);
+    int64_t found = PEN_NAME_UNKNOWN;
+    if (part.before == length)
+        return found;
+    for (uint32_t i = 0; i < index->count; i++) {
+        if (!index->keys[i].doubted || !may_be(index->keys[i].name, wanted, length, part))
+            continue;
+        if (found != PEN_NAME_UNKNOWN)
+            return PEN_NAME_UNKNOWN;
+        found = i;
+    }
+    return found;
 }
 
 /* ---- what a URI may mean ---- */
@@ -221,13 +286,16 @@ static int64_t find(const struct pen_names *index, const char *base, const char 
             continue;
         }
         wanted[count] = (struct pen_name_keys){
-            names[count], map(names[count], 0), map(names[count], UTF8PROC_CASEFOLD)};
+            names[count], map(names[count], 0), map(names[count], UTF8PROC_CASEFOLD), false};
         count++;
     }
     int64_t found = PEN_NAME_UNKNOWN;
     for (uint32_t k = 0; k < (loose ? 2 : 1) * count && found == PEN_NAME_UNKNOWN; k++)
         if (k >= count || !outside[k])
             found = look_up(index, &wanted[k % count], k >= count);
+    for (uint32_t k = 0; loose && k < count && found == PEN_NAME_UNKNOWN; k++)
+        if (!outside[k])
+            found = look_up_doubted(index, wanted[k].composed);
     for (uint32_t k = 0; k < count; k++) {
         free(wanted[k].composed);
         free(wanted[k].folded);

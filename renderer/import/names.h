@@ -21,12 +21,15 @@ struct pen_names {
 
 /* `names` are safe ones, and must outlive *index. */
 void pen_names_init(struct pen_names *index, const char *const *names, uint32_t count);
+/* Says of a name that its letters beyond ASCII were read in a code page that may not be its own. */
+void pen_names_doubt(struct pen_names *index, uint32_t number);
 void pen_names_finish(struct pen_names *index);
 
 enum { PEN_NAME_UNKNOWN = -1, PEN_NAME_AMBIGUOUS = -2, PEN_NAME_ELSEWHERE = -3 };
 /* The number of the name that `uri`, relative to the folder of the file called `base`, means. URIs
  * are taken as written by people: percent-encoded or not, with a query or not, '\' for '/', in
- * either Unicode normal form, and in other case where only one name fits. `loose`: a file that is
+ * either Unicode normal form, and in other case where only one name fits. Of names in doubt the only one
+ * that may be the same letters in another code page is taken. `loose`: a file that is
  * not where the URI says, or is said to lie outside the upload, is taken by its last part when only
  * one name ends in it, as forms drop the folders. Else one of the above; PEN_NAME_ELSEWHERE: it is
  * an address on a network, outside, or nothing that a file could be called. */

@@ -195,6 +195,37 @@ class Uploads(unittest.TestCase):
         self.assertEqual(answer.status, 201, answer.body)
         self.assertEqual(answer.json()["triangles"], 1)
 
+    def zip_of_names(self, uri, *raw_names):
+        """A zip whose entries have names of such bytes, and nothing says of which code page."""
+        gltf, binary = gltf_with_buffer(uri)
+        packed, stand_ins = io.BytesIO(), {}
+        with zipfile.ZipFile(packed, "w") as z:
+            z.writestr("scene.gltf", gltf)
+            for i, name in enumerate(raw_names):
+                stand_ins[b"%d" % i * len(name)] = name
+                z.writestr("%d" % i * len(name), binary)
+        body = packed.getvalue()
+        for stand_in, name in stand_ins.items():
+            body = body.replace(stand_in, name)
+        return self.post(body, "application/zip")
+
+    def test_zip_names_in_other_code_pages(self):
+        for uri, pages in (("K\u00f6rper/Gr\u00fc\u00dfe.bin",
+                            ("cp437", "cp850", "cp1252", "mac_roman", "utf-8")),
+                           ("\u30c6\u30af\u30b9\u30c1\u30e3/\u8868.bin", ("cp932", "euc_jp")),
+                           ("\u8d34\u56fe/\u7eb9\u7406.bin", ("gbk", "gb18030")),
+                           ("\u041c\u043e\u0434\u0435\u043b\u044c.bin", ("cp866", "cp1251", "koi8_r")),
+                           ("\ubaa8\ub378.bin", ("cp949",))):
+            for page in pages:
+                for others in ((), ("K\u00f6rper/Anderes.bin".encode(page, "ignore"),)):
+                    answer = self.zip_of_names(uri, uri.encode(page), *others)
+                    self.assertIn(answer.status, (200, 201), (uri, page, answer.body))
+        for names in ((b"\x94.bin", b"\xf6.bin"),  # either may be meant
+                      (b"\xc3\xb6.bin",),  # what is UTF-8 is itself
+                      (b"\xf6" * 9 + b".bin",), (b"a\xf6.bin",)):
+            answer = self.zip_of_names("\u00e4.bin", *names)
+            self.assertEqual(answer.status, 422, (names, answer.body))
+
     def test_zip_entries_that_nobody_can_mean(self):
         """The icon of a macOS folder, names too long, outside, of control characters: left out."""
         gltf, binary = gltf_with_buffer()

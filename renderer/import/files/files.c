@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
+#include <utf8proc.h>
 #include <zip.h>
 
 /* A copy of the tidy name; NULL when it cannot be used. */
@@ -34,6 +35,9 @@ static bool index_names(struct imp_files *files, struct pen_error *error)
         names[i] = files->items[i].name;
     pen_names_init(&files->names, names, files->count);
     free(names);
+    for (uint32_t i = 0; i < files->count; i++)
+        if (files->items[i].doubted)
+            pen_names_doubt(&files->names, i);
     return true;
 }
 
@@ -82,6 +86,19 @@ bool imp_files_open_bundle(
     return false;
 }
 
+/* libzip reads what is no UTF-8 in the first PC's code page, 437; archivers write the system's. */
+static bool is_doubted(zip_t *zip, uint64_t number)
+{
+    const char *raw = zip_get_name(zip, number, ZIP_FL_ENC_RAW);
+    for (utf8proc_int32_t letter; raw && *raw;) {
+        utf8proc_ssize_t bytes = utf8proc_iterate((const utf8proc_uint8_t *)raw, -1, &letter);
+        if (bytes < 1)
+            return true;
+        raw += bytes;
+    }
+    return false;
+}
+
 static bool zip_table(
     struct imp_files *files, const uint8_t *data, size_t bytes, struct pen_error *error)
 {
@@ -120,8 +137,10 @@ static bool zip_table(
             files->unusable++;
             continue;
         }
-        files->items[files->count++] =
-            (struct imp_file){.name = name, .bytes = (size_t)entry.size, .zip_entry = (uint64_t)i};
+        files->items[files->count++] = (struct imp_file){.name = name,
+            .bytes = (size_t)entry.size,
+            .zip_entry = (uint64_t)i,
+            .doubted = is_doubted(files->zip, (zip_uint64_t)i)};
     }
     if (unpacked > IMP_ZIP_RATIO_FROM_BYTES && unpacked / IMP_MAX_ZIP_RATIO > bytes)
         return pen_fail(

@@ -17,6 +17,7 @@ struct imp_file {
     const uint8_t *data; /* NULL: still in the zip */
     size_t bytes;
     uint64_t zip_entry;
+    bool doubted;   /* pen_names_doubt() */
     uint8_t *owned; /* unpacked from the zip */
 };
 

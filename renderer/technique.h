@@ -109,6 +109,7 @@ struct gbuffer {
     GLuint framebuffer;        /* of all of them */
     struct gbuffer_view shown; /* what it holds, from frame to frame */
     uint64_t triangles;        /* that were drawn for it */
+    uint32_t drawn;            /* how often */
 };
 
 /* What the frame does with an estimate that is not complete. */

@@ -53,6 +53,9 @@ bool sky_occlusion(const struct frame_job *job, const struct gbuffer *gbuffer,
     const struct gl_texture *solid, struct pen_error *error)
 {
     struct frame_targets *t = job->targets;
+    if (!solid && t->sky_of == gbuffer && t->sky_drawn == gbuffer->drawn)
+        return true;
+    t->sky_of = NULL;
     uint32_t width = (job->request->width + 1) / 2, height = (job->request->height + 1) / 2;
     const struct occlusion_block reach = {
         .reach = {0.6f * scene_radius(job->scene), 0.35f * (float)job->request->height}};
@@ -82,7 +85,11 @@ bool sky_occlusion(const struct frame_job *job, const struct gbuffer *gbuffer,
     pass.texture_count = 3;
     pass.framebuffer = t->sky_open[1].framebuffer;
     pass.extra = NULL;
-    return pass_fill(job->ctx, &pass, error);
+    if (!pass_fill(job->ctx, &pass, error))
+        return false;
+    t->sky_of = solid ? NULL : gbuffer;
+    t->sky_drawn = gbuffer->drawn;
+    return true;
 }
 
 static void scale3(float out[4], const float v[3], float factor, float w)

@@ -29,6 +29,8 @@ struct frame_targets {
     struct gl_target means[FRAME_MEANS], spread;
     struct frame_edges *edges;    /* edges.h; of the frame in progress, or NULL */
     struct gl_target sky_open[2]; /* R8, half size: how much of the sky is seen; raw, smooth */
+    const struct gbuffer *sky_of; /* whose sky that is, or NULL, */
+    uint32_t sky_drawn;           /* as it was drawn for the so many-th time */
 };
 /* Makes a sum fit the request's picture and start at 0. */
 void frame_fit_sum(struct gl_target *target, GLenum format, const struct pen_request *request);

@@ -21,7 +21,8 @@ static bool draws(struct pen_renderer *r, const struct pen_request *request)
     uint64_t hash = fixture_render(r, request, &result);
     pen_renderer_drop_shadows(r);
     CHECK(hash == fixture_render(r, request, &anew));
-    CHECK(pass_of(&anew, "gbuffer") != NULL);
+    CHECK(pass_of(&anew, "gbuffer") && pass_of(&anew, "sky occlusion"));
+    CHECK(!pass_of(&result, "gbuffer") == !pass_of(&result, "sky occlusion"));
     CHECK(result.triangles_drawn == anew.triangles_drawn && result.triangles_drawn > 0);
     return pass_of(&result, "gbuffer") != NULL;
 }

@@ -105,6 +105,7 @@ bool pass_gbuffer(struct technique_ctx *ctx, struct scene *scene, const struct v
     }
     g->shown.known = 0;
     g->triangles = 0;
+    g->drawn++;
     if (made && !pass_turn(ctx, error))
         return false;
     struct scene_pass pass = {.full = true, .blended = how->kind == GBUFFER_LAYER};

@@ -17,7 +17,7 @@ static const struct pen_param rows[] = {
         .help = "Shadow rays per pixel near a penumbra, rounded up to a power of two."),
     PARAM(struct denoised, refine, .def = 16, .min = 0, .max = 1024,
         .help = "More rays where the penumbra is too narrow to be filtered; 0: none."),
-    PARAM(struct denoised, budget, .def = 8, .min = 0, .max = 1024, .unit = "rays",
+    PARAM(struct denoised, budget, .def = 3, .min = 0, .max = 1024, .unit = "rays",
         .help = "Of those rays, per pixel of the picture at most: in hair and foliage each pixel "
                 "gets fewer."),
     SEED_ROW(struct denoised),

@@ -92,7 +92,7 @@ static void check_more_rays(void)
         double now[2];
         snprintf(method, sizeof method, METHOD "refine=0&samples=%u&", n);
         now[0] = measure(id, method, HARNESS_RECT, &t, truth_half_plane).rmse_penumbra;
-        snprintf(method, sizeof method, METHOD "refine=%u&", 4 * n);
+        snprintf(method, sizeof method, METHOD "budget=64&refine=%u&", 4 * n);
         now[1] = measure(id, method, NARROW, &narrow, truth_half_plane).rmse_penumbra;
         fprintf(stderr, "%u rays %.5f, %u more %.5f\n", n, now[0], 4 * n, now[1]);
         for (int k = 0; k < 2; k++)
@@ -134,7 +134,7 @@ static void check_against_many_rays(void)
             0.075},
     };
     static const char *const methods[] = {
-        "raytraced&samples=256&adaptive=false", "denoised", "pcss"};
+        "raytraced&samples=256&adaptive=false", "denoised&budget=8", "pcss"};
     uint8_t id[PEN_ID_BYTES];
     scene(PEN_GENERATED_DEMO, id);
     for (uint32_t i = 0; i < sizeof rows / sizeof *rows; i++) {

@@ -120,16 +120,15 @@ static size_t lay_out(struct denoise *d, uint8_t *room)
     return place(room, &used, pixels * sizeof *d->normals, &d->normals);
 }
 
-/* As many more rays for each as the budget allows. */
+/* As many more rays for each as the budget allows: any beginning of the sequence is well spread. */
 static void keep_budget(struct denoise *d)
 {
-    double pixels = (double)d->job->width * d->job->height;
-    double most = (double)d->how->budget * pixels, narrow = (double)atomic_load(&d->narrow);
-    d->refine = trace_points_round(d->how->refine ? d->how->refine : 1);
-    while (d->refine >= LEAST_MORE && narrow * d->refine > most)
-        d->refine /= 2;
-    d->capped = narrow > 0 && d->refine < LEAST_MORE;
-    if (!d->how->refine || !(narrow > 0) || d->capped)
+    double narrow = (double)atomic_load(&d->narrow);
+    double each = (double)d->how->budget * d->job->width * d->job->height / fmax(narrow, 1);
+    uint32_t most = d->how->refine && narrow > 0 ? trace_points_round(d->how->refine) : 0;
+    d->refine = each < most ? (uint32_t)each : most;
+    d->capped = d->refine < most && d->refine < LEAST_MORE;
+    if (d->capped)
         d->refine = 0;
 }
 

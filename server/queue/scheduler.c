@@ -11,7 +11,6 @@
 /* After the deadline, for a worker to finish what it has and to encode it. */
 #define BEST_GRACE_NS (20 * CLOCK_S)
 
-#define MOST_RETRY_S 600
 /* A render of the same place goes first when its client has not had so much more than who is next,
  * and nobody is passed more often. */
 #define SAME_PLACE_MS 250.0
@@ -31,6 +30,7 @@ struct scheduler *scheduler_create(
     s->on_work = on_work;
     s->context = context;
     s->mean_ms = 50;
+    s->measured_ratio = 1.5;
     return s;
 }
 
@@ -43,72 +43,6 @@ void scheduler_destroy(struct scheduler *s)
     estimates_destroy(s->estimates);
     shares_destroy(s->shares);
     free(s);
-}
-
-/* What a render will still take of the renderer; of one without an estimate `unknown_ms`. None goes on
- * when nobody waits for it. */
-static double left_ms(const struct scheduler *s, const struct render *r, double unknown_ms)
-{
-    uint64_t now = s->limits.now_ns();
-    double ms = r->estimate.ms < 0 ? unknown_ms : r->estimate.ms;
-    if (!r->waiters || r->last_deadline_ns < now)
-        return 0;
-    if (r->running) /* at most: it shared the renderer with the others */
-        ms -= clock_ms(now - r->taken_ns) / fmax(1, s->numbers.running);
-    return fmax(0, fmin(ms, clock_ms(r->last_deadline_ns - now)));
-}
-
-/* Everything that is there, on all workers together. */
-static double backlog_ms(const struct scheduler *s, double unknown_ms)
-{
-    double ms = 0;
-    for (const struct render *r = s->queue[0]; r; r = r->next)
-        ms += left_ms(s, r, unknown_ms);
-    for (const struct render *r = s->running; r; r = r->next)
-        ms += left_ms(s, r, unknown_ms);
-    return ms / fmax(1, s->limits.workers);
-}
-
-static uint32_t whole_seconds(double ms)
-{
-    return (uint32_t)fmin(MOST_RETRY_S, fmax(1, ceil(ms / 1e3)));
-}
-
-/* When about half of what is there is done. */
-static uint32_t retry_after(const struct scheduler *s)
-{
-    return whole_seconds(backlog_ms(s, s->mean_ms) / 2);
-}
-
-/* How long a new render will wait at least. As all are served in turn, no other client is in its way
- * for longer than its own renders take, times what the other's time counts less; of its own client's
- * those that are queued come first, and those that run give way until it has had as much. Only what
- * is known counts, and as far as it is sure. */
-static double wait_ms(const struct scheduler *s, uint64_t payer, bool batch, double own_ms)
-{
-    const struct render *lists[] = {s->queue[0], s->running};
-    double mine = own_ms, ms = 0;
-    for (struct account *a = accounts_first(s->accounts); a; a = a->next)
-        a->backlog_ms = 0;
-    for (int l = 0; l < 2; l++)
-        for (const struct render *r = lists[l]; r; r = r->next) {
-            double left = r->estimate.sure * left_ms(s, r, 0);
-            bool own = r->payer == payer && r->batch == batch;
-            if (own) {
-                left = r->running ? fmin(left, own_ms) : left;
-                ms += left;
-                mine += r->running ? 0 : left;
-            } else {
-                r->account->backlog_ms += left;
-            }
-        }
-    for (struct account *a = accounts_first(s->accounts); a; a = a->next) {
-        double times = a->batch == batch ? 1
-                       : batch           ? ACCOUNTS_BATCH_COST
-                                         : 1 / ACCOUNTS_BATCH_COST;
-        ms += fmin(a->backlog_ms, times * mine);
-    }
-    return ms / fmax(1, s->limits.workers);
 }
 
 void scheduler_release(struct scheduler *s, uint64_t client)
@@ -196,26 +130,6 @@ static void attach(struct scheduler *s, struct render *render, struct waiter *wa
     s->numbers.waiting++;
 }
 
-/* What comes first leaves too little of the time that the waiter has: *error says so. A render that
- * takes too long even alone is let in: its estimate may be wrong. What it takes itself, and so how far
- * others are in its way, counts only as far as like ones on its own scene have shown: others' dear
- * renders tell nothing of it. */
-static bool is_late(struct scheduler *s, const struct render *render, uint64_t payer,
-    const struct waiter *waiter, struct pen_error *error)
-{
-    uint64_t now = s->limits.now_ns();
-    double left = waiter->deadline_ns > now ? clock_ms(waiter->deadline_ns - now) : 0;
-    double own = waiter->best ? 0 : render->estimate.sure * render->estimate.least_ms;
-    double wait = wait_ms(s, payer, render->batch, own), over = wait + fmin(own, left / 2) - left;
-    if (!(wait > 0 && over > 0) || estimates_doubt(s->estimates, &render->request, now))
-        return false;
-    pen_fail(error, PEN_UNAVAILABLE, "/deadline_ms",
-        "What was asked for before takes about %.1f s: the image would not be ready in time.",
-        wait / 1e3);
-    error->retry_after_s = whole_seconds(over);
-    return true;
-}
-
 static void set_up(struct render *render, const struct pen_request *request,
     const struct waiter *waiter, struct estimate estimate)
 {
@@ -229,6 +143,7 @@ static void set_up(struct render *render, const struct pen_request *request,
     if (request->delivery.budget_ms)
         render->estimate.ms = fmin(estimate.ms, request->delivery.budget_ms);
     render->place = picture_place(request);
+    render->continues = waiter->continues;
 }
 
 static void enter(struct scheduler *s, struct render *render, uint64_t payer)
@@ -248,6 +163,7 @@ bool scheduler_submit(struct scheduler *s, const struct pen_request *request,
     struct render *fresh = pen_alloc_zero(1, sizeof *fresh);
     pthread_mutex_lock(&s->lock);
     set_up(fresh, request, waiter, estimates_of(s->estimates, request, s->limits.now_ns()));
+    scheduler_foresee(s, fresh, waiter);
     uint32_t held = waiter->client ? shares_held(s->shares, waiter->client) : 0;
     struct render *render = shareable ? find_key(s, key) : NULL;
     if (s->numbers.draining) {
@@ -255,10 +171,10 @@ bool scheduler_submit(struct scheduler *s, const struct pen_request *request,
     } else if (s->limits.client_share && held >= s->limits.client_share) {
         s->numbers.refused_share++;
         pen_fail(error, PEN_TOO_MANY, "", "This client already has %u renders under way.", held);
-    } else if (!render && s->numbers.queued >= s->limits.queue) {
+    } else if (!render && !fresh->continues && s->numbers.queued >= s->limits.queue) {
         s->numbers.refused_full++;
         pen_fail(error, PEN_UNAVAILABLE, "", "The queue is full.");
-    } else if (!render && is_late(s, fresh, payer, waiter, error)) {
+    } else if (!render && !fresh->continues && scheduler_is_late(s, fresh, payer, waiter, error)) {
         s->numbers.refused_late++;
     } else {
         if (waiter->client)
@@ -282,19 +198,36 @@ bool scheduler_submit(struct scheduler *s, const struct pen_request *request,
             if (waiter->reference_fd > 0)
                 render->reference_fd = fcntl(waiter->reference_fd, F_DUPFD_CLOEXEC, 3);
             enter(s, render, payer);
-            push_back(s, render);
+            if (render->continues) /* what was begun is done before the next is */
+                push_front(s, render);
+            else
+                push_back(s, render);
         }
         attach(s, render, waiter);
         render = NULL;
         error = NULL;
     }
     if (error && !error->retry_after_s)
-        error->retry_after_s = retry_after(s);
+        error->retry_after_s = scheduler_retry_s(s);
     pthread_mutex_unlock(&s->lock);
     free(fresh);
     if (!error)
         s->on_work(s->context);
     return !error;
+}
+
+/* Frees queued renders that nobody waits for any more. */
+static void prune(struct scheduler *s)
+{
+    struct render *next;
+    for (struct render *r = s->queue[0]; r; r = next) {
+        next = r->next;
+        if (r->waiters)
+            continue;
+        unlink_queued(s, r);
+        settle(s, r, 0);
+        free_render(r);
+    }
 }
 
 static void answer_all(struct waiter *list, const struct outcome *outcome)
@@ -407,6 +340,36 @@ static void start(struct scheduler *s, struct render *render)
     s->numbers.running++;
 }
 
+/* Answers those that wait to be begun and would be late, now that more is known than when they were
+ * let in, rather than at their deadline. */
+static void turn_away_hopeless(struct scheduler *s)
+{
+    struct waiter *list = NULL;
+    struct outcome outcome = {0};
+    struct render *next;
+    pthread_mutex_lock(&s->lock);
+    for (struct render *r = s->queue[0]; r; r = next) {
+        next = r->next;
+        if (!scheduler_is_hopeless(s, r))
+            continue;
+        while (r->waiters) {
+            struct waiter *waiter = r->waiters;
+            r->waiters = waiter->next;
+            waiter->next = list;
+            list = waiter;
+            s->numbers.waiting--;
+        }
+        s->numbers.refused_late++;
+    }
+    if (list)
+        prune(s);
+    outcome.error.retry_after_s = scheduler_retry_s(s);
+    pthread_mutex_unlock(&s->lock);
+    pen_fail(&outcome.error, PEN_UNAVAILABLE, "/deadline_ms",
+        "What was asked for before took longer than was known: this would not be ready in time.");
+    answer_all(list, &outcome);
+}
+
 struct render *scheduler_take(struct scheduler *s, const struct taker *taker)
 {
     for (;;) {
@@ -481,14 +444,20 @@ void scheduler_finish(struct scheduler *s, struct render *render, const struct o
         estimates_learn(s->estimates, &render->request, ms / picture_share(outcome->result), ok,
             s->limits.now_ns());
     settle(s, render, ms);
+    double run_ms = clock_ms(s->limits.now_ns() - render->taken_ns);
+    bool measured = render->measure != MEASURE_PICTURE;
+    if (ok && measured)
+        scheduler_learn_ratio(s, ms, run_ms);
     if (!ok)
-        answer.error.retry_after_s = retry_after(s);
-    answer.run_ms = clock_ms(s->limits.now_ns() - render->taken_ns);
+        answer.error.retry_after_s = scheduler_retry_s(s);
+    answer.run_ms = run_ms;
     pthread_mutex_unlock(&s->lock);
     answer.queue_ms = clock_ms(render->taken_ns - render->queued_ns);
     answer.shared = count > 1;
     answer_all(waiters, &answer);
     free_render(render);
+    if (measured)
+        turn_away_hopeless(s);
 }
 
 /* Moves the waiters that `now` has overtaken (UINT64_MAX: all of them) to *out. */
@@ -515,20 +484,6 @@ static uint64_t collect(struct scheduler *s, struct render *list, uint64_t now, 
     return next;
 }
 
-/* Frees queued renders that nobody waits for any more. */
-static void prune(struct scheduler *s)
-{
-    struct render *next;
-    for (struct render *r = s->queue[0]; r; r = next) {
-        next = r->next;
-        if (r->waiters)
-            continue;
-        unlink_queued(s, r);
-        settle(s, r, 0);
-        free_render(r);
-    }
-}
-
 static uint64_t end_overdue(struct scheduler *s, uint64_t now, struct outcome *outcome)
 {
     struct waiter *overdue = NULL;
@@ -543,7 +498,7 @@ static uint64_t end_overdue(struct scheduler *s, uint64_t now, struct outcome *o
         prune(s);
     for (struct waiter *w = overdue; w && now != UINT64_MAX; w = w->next)
         s->numbers.expired++;
-    outcome->error.retry_after_s = retry_after(s);
+    outcome->error.retry_after_s = scheduler_retry_s(s);
     pthread_mutex_unlock(&s->lock);
     answer_all(overdue, outcome);
     return next;
@@ -575,7 +530,7 @@ void scheduler_read(struct scheduler *s, struct scheduler_numbers *numbers)
     pthread_mutex_lock(&s->lock);
     *numbers = s->numbers;
     numbers->full = s->numbers.queued >= s->limits.queue;
-    numbers->backlog_ms = backlog_ms(s, 0);
+    numbers->backlog_ms = scheduler_backlog_ms(s, 0);
     numbers->estimates = estimates_count(s->estimates);
     pthread_mutex_unlock(&s->lock);
 }

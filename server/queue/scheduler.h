@@ -37,6 +37,12 @@ struct waiter {
     bool wants_part;  /* the scheduler's, after scheduler_submit; false again with each `part` */
     uint32_t measure; /* enum measure; what is measured is never shared */
     int reference_fd; /* planes to compare with, needed until scheduler_submit returns; 0: none */
+    /* What will be asked for when this is done, each `continues` what was let in with the first of
+     * them: not refused for what others ask for, and made before what waits to be begun. Needed
+     * until scheduler_submit returns. */
+    const struct pen_request *following;
+    uint32_t following_count;
+    bool continues;
 };
 
 struct render {
@@ -48,17 +54,18 @@ struct render {
     uint64_t queued_ns, taken_ns;
     uint64_t last_deadline_ns;
     uint64_t best_until_ns; /* of a waiter who takes what there is; 0: there is none */
-    bool shareable, running, batch, fresh;
+    bool shareable, running, batch, fresh, continues;
     uint32_t measure;
     int reference_fd;         /* the render's own; 0: none */
     uint32_t attempts, kills; /* kept by the worker pool */
     char request_id[33];      /* of the one who asked first, as is: */
     uint64_t payer;           /* whose time it takes */
     struct account *account;
-    struct estimate estimate; /* of when it was asked for */
-    double charged_ms;        /* to the account, before the time is known */
-    uint64_t place;           /* what of the scene and its lights can be used again; see taker */
-    uint32_t passed;          /* how often one behind it was taken while it could not be */
+    struct estimate estimate;               /* of when it was asked for */
+    double following_ms, following_sure_ms; /* of what follows: likely, and at least */
+    double charged_ms;                      /* to the account, before the time is known */
+    uint64_t place;  /* what of the scene and its lights can be used again; see taker */
+    uint32_t passed; /* how often one behind it was taken while it could not be */
     /* Of a worker that had no room for it: which, and how many renders had ended there. */
     uint32_t busy_worker;
     uint64_t busy_ended;

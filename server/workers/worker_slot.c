@@ -176,6 +176,14 @@ static bool may_have_last(const struct slot *slot, const struct render *render)
     return true;
 }
 
+/* Comparisons of one client are done one after the other: side by side they would all be late
+ * together, and disturb each other's times. */
+static bool is_beside_its_own(const struct render *render, const struct render *other)
+{
+    return render->measure != MEASURE_PICTURE && other->measure != MEASURE_PICTURE &&
+           render->payer == other->payer;
+}
+
 enum take worker_slot_fits(void *context, struct render *render)
 {
     struct slot *slot = context;
@@ -183,6 +191,8 @@ enum take worker_slot_fits(void *context, struct render *render)
     if (homes_is_away(slot->pool->homes, render, slot->index, clock_now_ns()))
         return TAKE_LATER;
     for (int i = 0; i < IN_FLIGHT; i++) {
+        if (slot->flights[i].render && is_beside_its_own(render, slot->flights[i].render))
+            return TAKE_LATER;
         if (!is_in_turns(&slot->flights[i]))
             continue;
         const struct pen_request *other = &slot->flights[i].render->request;

@@ -379,8 +379,96 @@ static void test_many_names(void)
     accounts_destroy(a);
 }
 
+#define ITEMS 4
+
+/* A comparison: one measurement after the other. */
+struct sequence {
+    struct waiter waiter; /* first */
+    struct scheduler *scheduler;
+    uint32_t at, code;
+    bool over;
+    uint64_t over_ns;
+};
+
+static bool ask_next(struct sequence *q, struct pen_error *error)
+{
+    struct pen_request requests[ITEMS] = {0};
+    for (int i = 0; i < ITEMS; i++) {
+        requests[i] =
+            (struct pen_request){.width = 100, .height = 100, .antialias = 1, .scene = {1}};
+        snprintf(requests[i].technique, sizeof requests[i].technique, "item %d", i);
+    }
+    q->waiter.continues = q->at > 0;
+    q->waiter.following = &requests[q->at + 1];
+    q->waiter.following_count = ITEMS - q->at - 1;
+    q->waiter.measure = MEASURE_COMPARED;
+    return scheduler_submit(
+        q->scheduler, &requests[q->at], (uint8_t[PEN_ID_BYTES]){0}, false, &q->waiter, error);
+}
+
+static void take_item(struct waiter *waiter, const struct outcome *outcome)
+{
+    struct sequence *q = (struct sequence *)waiter;
+    struct pen_error error = {0};
+    CHECK(!q->over);
+    q->code = outcome->error.code;
+    q->over = q->code || ++q->at == ITEMS || !ask_next(q, &error);
+    if (error.code)
+        q->code = error.code;
+    q->over_ns = now_ns;
+}
+
+static bool begin(struct scheduler *s, struct sequence *q, uint64_t deadline_ms)
+{
+    struct pen_error error = {0};
+    *q = (struct sequence){
+        .waiter = {.client = 1, .deadline_ns = now_ns + deadline_ms * MS, .finish = take_item},
+        .scheduler = s};
+    bool ok = ask_next(q, &error);
+    CHECK(ok || (error.code == PEN_UNAVAILABLE && error.retry_after_s >= 1));
+    return ok;
+}
+
+/* 32 comparisons at once: those that are let in are done in time, and begun ones before others. */
+static void test_sequences(void)
+{
+    struct scheduler *s = make(1000);
+    static struct sequence q[33];
+    struct render seen;
+    CHECK(begin(s, &q[32], 30000));
+    while (run(s, 500, 0, &seen))
+        ;
+    CHECK(q[32].over && !q[32].code);
+    int accepted = 0;
+    for (int i = 0; i < 32; i++)
+        accepted += begin(s, &q[i], 30000);
+    CHECK(accepted >= 6 && accepted <= 15); /* two seconds each */
+    while (run(s, 500, 0, &seen))
+        scheduler_expire(s);
+    for (int i = 0; i < accepted; i++) {
+        CHECK(q[i].over && !q[i].code && q[i].over_ns <= q[i].waiter.deadline_ns);
+        CHECK(!i || q[i].over_ns >= q[i - 1].over_ns + 2000 * MS);
+    }
+    /* What turns out to take five times as long is done as far as the time goes; the others are told
+     * as soon as that is known, and not at their deadline. */
+    uint64_t begun_ns = now_ns;
+    for (int i = accepted = 0; i < 32; i++)
+        accepted += begin(s, &q[i], 30000);
+    while (run(s, 2500, 0, &seen))
+        scheduler_expire(s);
+    int done = 0, told = 0;
+    for (int i = 0; i < accepted; i++) {
+        CHECK(q[i].over);
+        done += !q[i].code;
+        told += q[i].code == PEN_UNAVAILABLE && q[i].over_ns < begun_ns + 30000 * MS;
+    }
+    CHECK(done >= 2 && told >= accepted - done - 1);
+    scheduler_destroy(s);
+}
+
 int main(void)
 {
+    test_sequences();
     test_time_not_requests();
     test_batch();
     test_newcomers();

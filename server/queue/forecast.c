@@ -1,0 +1,141 @@
+/* How long what is asked for will take, and what comes before it, as far as that is known. */
+#include "server/base/clock.h"
+#include "server/queue/scheduler_state.h"
+#include <math.h>
+
+#define MOST_RETRY_S 600
+#define MOST_RATIO 10.0
+/* Of several that are to be done together the last one counts: what others and the machine do
+ * meanwhile must not take it beyond the deadline. */
+#define RESERVE 1.35
+
+/* What one takes until the next of its client can be begun. */
+static double ratio_of(const struct scheduler *s, const struct render *render)
+{
+    return render->measure == MEASURE_PICTURE ? 1 : s->measured_ratio;
+}
+
+void scheduler_learn_ratio(struct scheduler *s, double renderer_ms, double run_ms)
+{
+    double ratio = fmin(MOST_RATIO, fmax(1, run_ms / fmax(1, renderer_ms)));
+    s->measured_ratio += 0.2 * (ratio - s->measured_ratio);
+}
+
+void scheduler_foresee(
+    const struct scheduler *s, struct render *render, const struct waiter *waiter)
+{
+    for (uint32_t i = 0; i < waiter->following_count; i++) {
+        struct estimate e = estimates_of(s->estimates, &waiter->following[i], s->limits.now_ns());
+        render->following_ms += fmax(0, e.ms);
+        render->following_sure_ms += e.sure * e.least_ms;
+    }
+}
+
+/* What a render will still take of the renderer; of one without an estimate `unknown_ms`. None goes on
+ * when nobody waits for it. */
+static double left_ms(const struct scheduler *s, const struct render *r, double unknown_ms)
+{
+    uint64_t now = s->limits.now_ns();
+    double ms = r->estimate.ms < 0 ? unknown_ms : r->estimate.ms;
+    if (!r->waiters || r->last_deadline_ns < now)
+        return 0;
+    if (r->running) /* at most: it shared the renderer with the others */
+        ms -= clock_ms(now - r->taken_ns) / fmax(1, s->numbers.running);
+    ms = ratio_of(s, r) * (fmax(0, ms) + r->following_ms);
+    return fmax(0, fmin(ms, clock_ms(r->last_deadline_ns - now)));
+}
+
+/* Everything that is there, on all workers together. */
+double scheduler_backlog_ms(const struct scheduler *s, double unknown_ms)
+{
+    double ms = 0;
+    for (const struct render *r = s->queue[0]; r; r = r->next)
+        ms += left_ms(s, r, unknown_ms);
+    for (const struct render *r = s->running; r; r = r->next)
+        ms += left_ms(s, r, unknown_ms);
+    return ms / fmax(1, s->limits.workers);
+}
+
+static uint32_t whole_seconds(double ms)
+{
+    return (uint32_t)fmin(MOST_RETRY_S, fmax(1, ceil(ms / 1e3)));
+}
+
+/* When about half of what is there is done. */
+uint32_t scheduler_retry_s(const struct scheduler *s)
+{
+    return whole_seconds(scheduler_backlog_ms(s, s->mean_ms) / 2);
+}
+
+/* How long a new render will wait at least. As all are served in turn, no other client is in its way
+ * for longer than its own renders take, times what the other's time counts less; of its own client's
+ * those that are queued come first, and those that run give way until it has had as much. Only what
+ * is known counts, and as far as it is sure. */
+static double wait_ms(const struct scheduler *s, uint64_t payer, bool batch, double own_ms)
+{
+    const struct render *lists[] = {s->queue[0], s->running};
+    double mine = own_ms, ms = 0;
+    for (struct account *a = accounts_first(s->accounts); a; a = a->next)
+        a->backlog_ms = 0;
+    for (int l = 0; l < 2; l++)
+        for (const struct render *r = lists[l]; r; r = r->next) {
+            double left = r->estimate.sure * left_ms(s, r, 0);
+            bool own = r->payer == payer && r->batch == batch;
+            if (own) {
+                left = r->running ? fmin(left, own_ms) : left;
+                ms += left;
+                mine += r->running ? 0 : left;
+            } else {
+                r->account->backlog_ms += left;
+            }
+        }
+    for (struct account *a = accounts_first(s->accounts); a; a = a->next) {
+        double times = a->batch == batch ? 1
+                       : batch           ? ACCOUNTS_BATCH_COST
+                                         : 1 / ACCOUNTS_BATCH_COST;
+        ms += fmin(a->backlog_ms, times * mine);
+    }
+    return ms / fmax(1, s->limits.workers);
+}
+
+/* What comes first leaves too little of the time that the waiter has: *error says so. A render that
+ * takes too long even alone is let in: its estimate may be wrong. What it takes itself, and so how far
+ * others are in its way, counts only as far as like ones on its own scene have shown: others' dear
+ * renders tell nothing of it. */
+bool scheduler_is_late(struct scheduler *s, const struct render *render, uint64_t payer,
+    const struct waiter *waiter, struct pen_error *error)
+{
+    uint64_t now = s->limits.now_ns();
+    double left = waiter->deadline_ns > now ? clock_ms(waiter->deadline_ns - now) : 0;
+    double own = waiter->best ? 0 : render->estimate.sure * render->estimate.least_ms;
+    own = ratio_of(s, render) * (own + render->following_sure_ms);
+    double most = waiter->following_count ? left : left / 2; /* many say more than one */
+    double reserve = waiter->following_count ? RESERVE : 1;
+    double wait = reserve * wait_ms(s, payer, render->batch, own);
+    double over = wait + fmin(reserve * own, most) - left;
+    if (!(wait > 0 && over > 0) || estimates_doubt(s->estimates, &render->request, now))
+        return false;
+    pen_fail(error, PEN_UNAVAILABLE, "/deadline_ms",
+        "What was asked for before takes about %.1f s: this would not be ready in time.",
+        wait / 1e3);
+    error->retry_after_s = whole_seconds(over);
+    return true;
+}
+
+bool scheduler_is_hopeless(const struct scheduler *s, const struct render *render)
+{
+    uint64_t now = s->limits.now_ns();
+    double own = render->estimate.sure * render->estimate.least_ms + render->following_sure_ms;
+    double needs = ratio_of(s, render) * own;
+    if (render->continues || render->following_sure_ms <= 0 || render->last_deadline_ns < now)
+        return false;
+    const struct render *before[] = {s->running, s->queue[0]};
+    bool others = false;
+    for (int l = 0; l < 2; l++)
+        for (const struct render *r = before[l]; r && r != render; r = r->next)
+            if (r->payer == render->payer && r->batch == render->batch) {
+                needs += r->estimate.sure * left_ms(s, r, 0) / fmax(1, s->limits.workers);
+                others = true;
+            }
+    return others && needs > clock_ms(render->last_deadline_ns - now);
+}

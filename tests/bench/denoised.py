@@ -2,7 +2,8 @@
 """What `denoised` is worth beside another method: error in the penumbra, time of whole requests.
 
     denoised.py [--bin DIR] [--shared DIR] [--scenes a,b] [--rounds N] [--repeat N]
-                [--truth SAMPLES] [--against pcss] [--methods "denoised,denoised budget=4"] [--keep DIR]
+                [--truth SAMPLES] [--against pcss] [--methods "denoised,denoised budget=4"]
+                [--keep DIR]
 
 Scenes and views are those of claims/scenes.py. The error is the root of the mean squared difference
 of the visibility to that of many rays, over the pixels that these see partly lit. Times are taken

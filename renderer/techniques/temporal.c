@@ -1,6 +1,8 @@
 #include "renderer/passes/draw/passes.h"
 #include "renderer/passes/draw/turn.h"
 #include "renderer/passes/filter/history.h"
+#include "renderer/passes/filter/penumbra.h"
+#include "renderer/techniques/penumbra_params.h"
 #include "renderer/techniques/sample_params.h"
 #include <math.h>
 #include <string.h>
@@ -16,6 +18,10 @@ struct temporal {
     float bias;
     uint32_t most, most_moving;
     float plane_px, normal_deg, clip;
+    float smooth;
+    uint32_t search_taps;
+    float min_filter;
+    uint32_t max_radius;
 };
 
 static const struct pen_param rows[] = {
@@ -27,7 +33,7 @@ static const struct pen_param rows[] = {
     PARAM(struct temporal, most, .def = 20, .min = 1, .max = 65536, .unit = "samples",
         .help = "How much the past counts at most while the camera moves; older frames fade. With "
                 "a camera and a scene that stand still, everything counts."),
-    PARAM(struct temporal, most_moving, .def = 12, .min = 1, .max = 65536, .unit = "samples",
+    PARAM(struct temporal, most_moving, .def = 8, .min = 1, .max = 65536, .unit = "samples",
         .help = "The same while an animation moves the scene."),
     PARAM(struct temporal, plane_px, .def = 1, .min = 0.01, .max = 100, .unit = "px",
         .help = "The past of a pixel is that of another surface when it lies farther beside the "
@@ -37,6 +43,12 @@ static const struct pen_param rows[] = {
     PARAM(struct temporal, clip, .def = 1.5, .min = 0, .max = 100, .unit = "standard errors",
         .help = "While an animation moves the scene, how far the past may be from the new samples; "
                 "0: any."),
+    PARAM(struct temporal, smooth, .def = 1.5, .min = 0, .max = 4,
+        .help = "While an animation moves the scene: over how much of the part of a penumbra that "
+                "one of a pixel's samples stands for its steps are smoothed; 0: not at all."),
+    PENUMBRA_ROWS(struct temporal, 12),
+    PARAM(struct temporal, max_radius, .def = 128, .min = 1, .max = 1024, .unit = "px",
+        .help = "Largest reach of that on the screen."),
 };
 
 #define SHARED_ROWS "renderer/techniques/temporal.def"
@@ -93,6 +105,13 @@ static void look_back(const struct technique_run *run, struct past *past)
         past->batches = 0;
 }
 
+/* Pixels have few samples while the scene moves. */
+static bool is_smoothed(const struct technique_run *run, const struct past *past)
+{
+    const struct temporal *params = run->params;
+    return past->layer && past->moved && params->smooth > 0 && run->face->extent[0] > 0;
+}
+
 /* Of the frame's first sample. While the camera moves a few batches come round again, which pixels
  * that the past tells nothing of can then have all of. */
 static uint32_t first_sample(const struct technique_run *run, const struct past *past)
@@ -146,6 +165,7 @@ static void fill_block(
     else if (past->still)
         block->fresh[1] = MOST_WHEN_STILL;
     block->limits[2] = past->moved ? params->clip : 0;
+    block->fresh[2] = params->smooth;
     block->limits[3] = !past->still && past->batches;
 }
 
@@ -246,6 +266,34 @@ static bool blend(struct technique_run *run, const struct gl_target *more, uint3
         error);
 }
 
+/* Of what is shown alone: nothing of it is carried on. */
+static bool smooth(struct technique_run *run, const struct past *past,
+    const struct gl_target *shown, struct pen_error *error)
+{
+    const struct history_layer *next = history_next(run);
+    struct temporal_block block;
+    fill_block(run, past, &block);
+    struct pass_texture textures[] = {
+        {UNIT_DEPTH, run->gbuffer->depth.texture.name, GL_SAMPLE_NEAREST},
+        {UNIT_NORMAL, run->gbuffer->normal.texture.name, GL_SAMPLE_NEAREST},
+        {UNIT_FRESH, next->mean.name, GL_SAMPLE_NEAREST},
+        {UNIT_LAST_STATE, next->state.name, GL_SAMPLE_NEAREST},
+        {UNIT_PENUMBRA, pass_penumbra_target(run, PENUMBRA_SPREAD)->texture.name,
+            GL_SAMPLE_NEAREST}};
+    return pass_fill(run->ctx,
+        &(struct pass_fill){.name = "temporal smoothing",
+            .fragment = "temporal_smooth.frag",
+            .stage = PEN_STAGE_TECHNIQUE,
+            .textures = textures,
+            .texture_count = 5,
+            .framebuffer = shown->framebuffer,
+            .width = run->width,
+            .height = run->height,
+            .extra = &block,
+            .extra_bytes = sizeof block},
+        error);
+}
+
 static bool resolve(struct technique_run *run, GLuint mean, struct pen_error *error)
 {
     struct pass_texture texture = {UNIT_SOURCE, mean, GL_SAMPLE_NEAREST};
@@ -271,6 +319,8 @@ static bool conclude(struct technique_run *run, const struct past *past, struct 
         return resolve(run, sums[0].texture.name, error);
     if (!join(run, past, &sums[0], error))
         return false;
+    if (is_smoothed(run, past))
+        return smooth(run, past, &sums[0], error) && resolve(run, sums[0].texture.name, error);
     if (!past->layer || past->still || !past->batches)
         return resolve(run, history_next(run)->mean.name, error);
     gl_target_fit(&sums[1], GL_RGBA32F, run->width, run->height, 0, 1);
@@ -296,7 +346,9 @@ static bool record(struct technique_run *run, struct pen_error *error)
     run->map_size = run->bound.map_size = params->map_size;
     run->bound.texels = 2;
     run->bound.late = true;
-    return add_samples(run, &past, &sums[0], error) &&
+    return (!is_smoothed(run, &past) ||
+               pass_penumbra_spread(run, params->map_size, params->min_filter, error)) &&
+           add_samples(run, &past, &sums[0], error) &&
            (!pass_is_last_face(run) || conclude(run, &past, sums, error));
 }
 

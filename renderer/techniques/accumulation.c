@@ -76,9 +76,11 @@ const struct technique technique_accumulation = {
                    "hides of the light.",
         .citation = "B. Aszodi, L. Szirmay-Kalos, Real-time soft shadows with shadow accumulation, "
                     "Eurographics 2006 short papers",
-        .artefacts = "Light leaks between texels at different depths; casters behind one another "
-                     "are not seen with one layer; mode paper over- and undershoots where texels "
-                     "are large against the light." BLENDED_GRAIN,
+        .artefacts =
+            "Light leaks between texels at different depths among leaves, hair and flutes; "
+            "what a surface without gaps closes off is dark; casters behind one another "
+            "are not seen with one layer; mode paper over- and undershoots where texels "
+            "are large against the light." BLENDED_GRAIN,
         .cost_class = PEN_COST_HEAVY,
         .textured = false,
         .struct_size = sizeof(struct accumulation),

@@ -51,7 +51,8 @@ const struct technique technique_backprojection = {
                     "backprojection, EGSR 2006",
         .artefacts =
             "Casters that overlap as seen from the receiver are subtracted twice, which is "
-            "too dark; gaps wider than the threshold leak; one layer sees only what the "
+            "too dark; gaps wider than the threshold leak among leaves, hair and flutes, not "
+            "through a surface without gaps; one layer sees only what the "
             "light's centre sees." BLENDED_GRAIN,
         .cost_class = PEN_COST_HEAVY,
         .textured = true,

@@ -103,8 +103,10 @@ const struct technique technique_bitmask = {
         .citation =
             "M. Schwarz, M. Stamminger, Bitmask soft shadows, Computer Graphics Forum 26(3) "
             "(Eurographics), 2007",
-        .artefacts = "As many grey levels as points; gaps between texels of steep casters leak; "
-                     "with one layer, only what the light's centre sees casts." BLENDED_GRAIN,
+        .artefacts =
+            "As many grey levels as points; gaps between texels of steep casters leak among "
+            "leaves, hair and flutes, not through a surface without gaps; "
+            "with one layer, only what the light's centre sees casts." BLENDED_GRAIN,
         .cost_class = PEN_COST_HEAVY,
         .textured = true,
         .struct_size = sizeof(struct bitmask),

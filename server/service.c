@@ -204,6 +204,7 @@ static bool start_pool(struct service *s, struct pen_error *error)
     struct worker_pool_config config = {.workers = (uint32_t)c->workers,
         .warm_up = c->warm_up.on,
         .hang_timeout_ms = c->hang_timeout_ms,
+        .silence_timeout_ms = c->silence_timeout_ms,
         .quarantine_s = c->quarantine_s,
         .scheduler = s->scheduler,
         .open_job = open_job,

@@ -66,6 +66,8 @@ static const struct row rows[] = {
     ROW(hang_timeout_ms, "60000", TIME,
         .help = "A worker that has work and gives no sign of life for so long is replaced, or "
                 "sooner (10 s) when that is far longer than it ever took."),
+    ROW(silence_timeout_ms, "8000", TIME,
+        .help = "A worker whose process stands still for so long is replaced."),
     ROW(canary_interval_ms, "5000", TIME, .help = "How long /readyz trusts its last test render."),
     ROW(quarantine_s, "600", .form = "SECONDS", .max = 86400,
         .help = "How long a scene that ended two workers is refused."),

@@ -41,6 +41,8 @@ static const char *obstacle_of(struct service *s)
         return "The worker is still warming up.";
     if (!pool.up)
         return "No worker is up.";
+    if (pool.silent >= pool.up)
+        return "No worker answers.";
     if (queue.full)
         return "The queue is full.";
     return NULL;

@@ -5,9 +5,10 @@
 #include "server/queue/measure.h"
 #include <stddef.h>
 
-#define CHANNEL_VERSION 7u
-#define CHANNEL_MAX_JOBS 8  /* that a worker has at a time, being encoded or not */
-#define CHANNEL_WORKER_FD 3 /* the worker's end */
+#define CHANNEL_VERSION 8u
+#define CHANNEL_MAX_JOBS 8   /* that a worker has at a time, being encoded or not */
+#define CHANNEL_WORKER_FD 3  /* the worker's end */
+#define CHANNEL_ALIVE_MS 500 /* how often a worker says that it is there */
 #define CHANNEL_MAX_FDS (2 + PEN_MAX_LIGHTS)
 
 /* --warm-up N: what the worker compiles before it is asked for it. FILL: everything, into the driver's
@@ -31,6 +32,7 @@ enum channel_kind {
     CHANNEL_PART,      /* worker: the picture so far, as CHANNEL_DONE has it; the job goes on */
     CHANNEL_DONE,     /* worker: the answer; a sealed memfd for each thing that enum measure says */
     CHANNEL_RESIDENT, /* worker: the scenes in GPU memory, when they have changed */
+    CHANNEL_ALIVE,    /* worker: its process runs, whatever its GL thread does */
     CHANNEL_JOB,      /* front end: descriptors: the scene's blob, `image_count` images, and the
                           reference's planes when there is something to compare with */
     CHANNEL_CANCEL,   /* front end: nobody waits for this job; it is answered all the same */

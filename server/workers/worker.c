@@ -10,6 +10,7 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <poll.h>
+#include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -33,6 +34,24 @@ static void send_or_exit(const struct channel_message *message)
 {
     if (!channel_send(CHANNEL_WORKER_FD, message, NULL))
         _exit(EXIT_PROTOCOL); /* the daemon is gone */
+}
+
+/* A process that is stopped, frozen or starved is silent; a pass that takes long is not. */
+static void *say_alive(void *argument)
+{
+    (void)argument;
+    static const struct channel_message message = {CHANNEL_VERSION, CHANNEL_ALIVE, 0};
+    while (channel_send(CHANNEL_WORKER_FD, &message, NULL))
+        usleep(CHANNEL_ALIVE_MS * 1000);
+    return NULL;
+}
+
+static void begin_to_say_alive(void)
+{
+    pthread_t thread;
+    if (pthread_create(&thread, NULL, say_alive, NULL))
+        abort();
+    pthread_detach(thread);
 }
 
 static void warm_up(struct worker *worker)
@@ -316,6 +335,7 @@ int main(int argc, char **argv)
     hello.hello.create_ms = (float)clock_ms(clock_now_ns() - start);
     hello.hello.device = *pen_renderer_device(worker.renderer);
     send_or_exit(&hello);
+    begin_to_say_alive();
     if (what == WORKER_WARM_UP_USUAL)
         warm_up(&worker);
     int status = serve(&worker);

@@ -9,7 +9,7 @@ struct worker_pool_config {
     struct pen_renderer_config renderer;
     bool warm_up;
     uint32_t workers;
-    uint64_t hang_timeout_ms, quarantine_s;
+    uint64_t hang_timeout_ms, silence_timeout_ms, quarantine_s;
     struct scheduler *scheduler;
     /* Opens the blobs that a request needs: fds->fd[0] the scene's, then one per entry of
      * job->images. Called from the pool's threads. */
@@ -25,8 +25,9 @@ struct worker_pool_config {
 struct worker_pool_numbers {
     bool has_device; /* a worker has said on what it renders */
     struct pen_device_info device;
-    bool warmed; /* a worker has been through its warm-up */
-    uint32_t up; /* workers that take jobs now */
+    bool warmed;     /* a worker has been through its warm-up */
+    uint32_t up;     /* workers that take jobs now */
+    uint32_t silent; /* of these, whose processes stand still */
     uint32_t restarts, crashes, hangs, retries, quarantined, cancelled;
     uint64_t gpu_bytes;
     struct pen_program_counts programs; /* of all workers, each since its start */

@@ -25,6 +25,8 @@
 #define LEAST_PATIENCE_NS (10 * CLOCK_S)
 #define SILENCES 120
 #define START_PATIENCE_NS (120 * CLOCK_S)
+#define SILENT_NS (2 * CLOCK_S) /* four heartbeats */
+#define OWN_SLEEP_NS (1500 * CLOCK_MS)
 #define FILL_PATIENCE_NS (1800 * CLOCK_S)
 
 static bool is_stopping(const struct worker_pool *pool)
@@ -56,7 +58,7 @@ static void spawn(struct slot *slot)
     slot->said_hello = slot->hung = false;
     slot->turn_job = 0;
     slot->turning = false;
-    slot->heard_ns = slot->spawned_ns;
+    slot->heard_ns = slot->alive_ns = slot->looked_ns = slot->spawned_ns;
     slot->silence_ns = 0;
     if (socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, pair)) {
         slot->failures++;
@@ -178,8 +180,10 @@ static void bury(struct slot *slot)
         process_wait(&slot->process, -1, &status);
     }
     slot->died_ns = clock_now_ns();
-    bool outside = WIFSIGNALED(status) && !slot->hung &&
-                   (WTERMSIG(status) == SIGKILL || WTERMSIG(status) == SIGTERM);
+    /* No render stops a process. */
+    bool outside =
+        slot->silent || (WIFSIGNALED(status) && !slot->hung &&
+                            (WTERMSIG(status) == SIGKILL || WTERMSIG(status) == SIGTERM));
     const struct flight *suspect = worker_slot_find(slot, slot->turn_job);
     if (suspect && suspect->phase != PHASE_RENDERING)
         suspect = NULL;
@@ -193,6 +197,8 @@ static void bury(struct slot *slot)
         pool->numbers.hangs += slot->hung;
         pool->numbers.crashes += !slot->hung && !outside;
         pool->numbers.up -= slot->said_hello;
+        pool->numbers.silent -= slot->silent;
+        slot->silent = false;
         pool->numbers.pids[slot->index] = 0;
         pthread_mutex_unlock(&pool->lock);
     }
@@ -348,6 +354,24 @@ static bool is_hung(const struct slot *slot, uint64_t now)
     return is_at_work(slot) && now - since > (sent_only ? start : patience);
 }
 
+/* Whether the process stands still: its heartbeat does not wait for anything. What this thread itself
+ * has slept through is not held against it. */
+static bool is_silent(struct slot *slot, uint64_t now)
+{
+    if (now - slot->looked_ns > OWN_SLEEP_NS)
+        slot->alive_ns = now;
+    slot->looked_ns = now;
+    bool silent = slot->said_hello && now - slot->alive_ns > SILENT_NS;
+    if (silent != slot->silent) {
+        log_event(LOG_ERROR, "worker %u %s", slot->index, silent ? "stands still" : "goes on");
+        pthread_mutex_lock(&slot->pool->lock);
+        slot->silent = silent;
+        slot->pool->numbers.silent += silent ? 1 : -1u;
+        pthread_mutex_unlock(&slot->pool->lock);
+    }
+    return silent && now - slot->alive_ns > slot->pool->config.silence_timeout_ms * CLOCK_MS;
+}
+
 static int timeout_ms(uint64_t next_ns)
 {
     uint64_t now = clock_now_ns();
@@ -385,13 +409,15 @@ static void *run(void *argument)
             look_after_cache(slot);
         if (!alive)
             continue;
-        if (is_hung(slot, clock_now_ns())) {
+        /* What a stopped process said before that is read first. */
+        bool ok = worker_slot_hear(slot);
+        if (is_silent(slot, clock_now_ns()) || is_hung(slot, clock_now_ns())) {
             slot->hung = true;
             process_signal(&slot->process, SIGKILL);
             process_wait(&slot->process, -1, &(int){0});
         }
         /* What a dead worker said last still counts: the socket is emptied before the funeral. */
-        bool ok = worker_slot_hear(slot);
+        ok = ok && worker_slot_hear(slot);
         if (slot->hung || !ok || (watch[2].revents && !worker_slot_hear(slot)) ||
             (slot->said_hello && (!cancel_unwanted(slot) || !feed(slot) || !ask_for_parts(slot))))
             bury(slot);

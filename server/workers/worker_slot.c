@@ -258,6 +258,9 @@ static bool on_message(
     struct slot *slot, const struct channel_message *message, const struct channel_fds *fds)
 {
     struct flight *flight = worker_slot_find(slot, message->job);
+    slot->alive_ns = clock_now_ns();
+    if (message->kind == CHANNEL_ALIVE)
+        return true;
     hear_life(slot);
     switch (message->kind) {
     case CHANNEL_HELLO:

@@ -36,6 +36,8 @@ struct slot {
     struct process process;
     int socket;
     bool said_hello, is_replacement, hung;
+    bool silent;                            /* its process does not run; guarded by pool->lock */
+    uint64_t alive_ns, looked_ns;           /* the last message, the last look for one */
     uint64_t turn_job;                      /* whose turn it is; 0: nobody's */
     bool turning;                           /* it has begun */
     struct pen_place turn_place;            /* where that job was when the turn began */

@@ -57,7 +57,7 @@ class Daemon:
             self.process.stdout.close()
         self.log_path = os.path.join(self.folder, "log-%f" % time.time())
         flags = {"--listen": "127.0.0.1:0", "--admin-listen": "127.0.0.1:0", "--store": self.store,
-                 "--warm-up": "off"}
+                 "--warm-up": "off", "--silence-timeout-ms": "3600000"}
         extra = []
         for flag in self.flags:
             name = flag.split("=")[0]

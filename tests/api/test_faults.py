@@ -133,6 +133,34 @@ class Faults(unittest.TestCase):
         wait(lambda: self.d.metric("penumbra_worker_hangs_total") == 1)
         self.assertEqual(self.d.render(scene, SMALL).status, 200)
 
+    def test_worker_that_stands_still(self):
+        """Whatever is said of hangs: not ready soon, replaced before long, and no scene is blamed."""
+        # One that is stopped for less than the time that it is given goes on.
+        worker = self.d.worker()
+        os.kill(worker, signal.SIGSTOP)
+        wait(lambda: "No worker answers" in self.d.admin("/readyz").body.decode())
+        os.kill(worker, signal.SIGCONT)
+        wait(lambda: self.d.admin("/readyz").status == 200)
+        self.assertEqual(self.d.worker(), worker)
+        self.d.stop()
+        self.d.flags.append("--silence-timeout-ms=5000")
+        self.d.start()
+        scene = self.d.upload(grid_scene(4))
+        expected = self.d.render(scene, SMALL).body
+        for i in range(2):
+            worker = self.d.worker()
+            thread, box = self.in_background(scene, dict(SMALL, exposure_ev=i))
+            thread.join()
+            os.kill(worker, signal.SIGSTOP)
+            thread, box = self.in_background(scene, SMALL)
+            wait(lambda: self.d.admin("/readyz").status == 503)
+            thread.join()
+            self.assertEqual((box[0].status, box[0].body == expected), (200, True), box[0].body[:200])
+            self.assertNotEqual(self.d.worker(), worker)
+            wait(lambda: self.d.admin("/readyz").status == 200)
+        self.assertEqual(self.d.metric("penumbra_worker_hangs_total"), 2)
+        self.assertEqual(self.d.metric("penumbra_quarantined_scenes"), 0)
+
     def test_worker_that_dies_at_once(self):
         """No worker at all: requests wait, then time out; the daemon stays alive and not ready."""
         self.d.stop()

@@ -1,5 +1,7 @@
 """What smooth edges cost: processor time of a frame with them over that without, in alternation.
 
+The camera turns by a degree from frame to frame.
+
 usage: edge_cost.py PENUMBRA_SHOT SCENE [key=value ...]; a scene as penumbra-shot takes it. The load
 of the machine changes both times and their ratio less: give it several rounds (ROUNDS=9).
 """
@@ -18,7 +20,7 @@ def seconds(shot, scene, settings, frames):
         return usage.ru_utime + usage.ru_stime
     before = spent()
     with tempfile.NamedTemporaryFile(suffix=".png") as file:
-        subprocess.run([shot, scene, file.name, "repeat=%d" % frames] + settings, check=True,
+        subprocess.run([shot, scene, file.name, "repeat=%d" % frames, "turn=1"] + settings, check=True,
                        stdout=subprocess.DEVNULL)
     return spent() - before
 

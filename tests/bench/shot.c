@@ -1,6 +1,7 @@
 /* penumbra-shot SCENE.pscene OUT.png [key=value ...]: one image without a daemon. Keys are those of
  * the GET render call; repeat=N renders N times and prints the last one's times and, in
- * brackets, the least of each pass; a scene name of
+ * brackets, the least of each pass; turn=D turns the camera by so many degrees each time, so that
+ * nothing of the view is kept (lights stay where the first frame had them); a scene name of
  * penumbra generate (square, demo, ...) instead of a file makes that scene. */
 #include "protocol/json_request.h"
 #include "renderer/blob/pscene.h"
@@ -8,6 +9,7 @@
 #include "renderer/renderer.h"
 #include "renderer/generate/generate.h"
 #include <fcntl.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -39,6 +41,16 @@ static int report(const struct pen_error *error)
     return 1;
 }
 
+/* The same request, seen from further round its target's vertical. */
+static void turn_camera(struct pen_request *request, const struct pen_request *before, double angle)
+{
+    *request = *before;
+    struct pen_camera *camera = &request->camera;
+    double x = camera->eye[0] - camera->target[0], z = camera->eye[2] - camera->target[2];
+    camera->eye[0] = camera->target[0] + cos(angle) * x + sin(angle) * z;
+    camera->eye[2] = camera->target[2] - sin(angle) * x + cos(angle) * z;
+}
+
 int main(int argc, char **argv)
 {
     if (argc < 3) {
@@ -49,6 +61,7 @@ int main(int argc, char **argv)
     struct pen_query_pair pairs[64];
     uint32_t count = 0;
     int repeat = 1;
+    double turn = 0;
     for (int i = 3; i < argc && count < 64; i++) {
         char *equals = strchr(argv[i], '=');
         if (!equals)
@@ -56,6 +69,8 @@ int main(int argc, char **argv)
         *equals = 0;
         if (!strcmp(argv[i], "repeat"))
             repeat = atoi(equals + 1);
+        else if (!strcmp(argv[i], "turn"))
+            turn = atof(equals + 1);
         else
             pairs[count++] = (struct pen_query_pair){argv[i], equals + 1};
     }
@@ -75,6 +90,8 @@ int main(int argc, char **argv)
     static float least[PEN_MAX_PASSES];
     for (int i = 0; i < repeat; i++) {
         pen_frame_finish(&frame);
+        if (i && turn != 0)
+            turn_camera(&request, &result.completed, turn * M_PI / 180);
         if (!pen_renderer_render(renderer, &request, &frame, &result, &error))
             return report(&error);
         for (uint32_t k = 0; k < result.pass_count; k++)

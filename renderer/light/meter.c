@@ -53,6 +53,11 @@ static float irradiance(const struct light *light, const float p[3], const float
     return value * glm_vec3_dot((float *)n, to) / (d * fmaxf(d2 + area / GLM_PIf, 1e-20f));
 }
 
+struct reading {
+    float level; /* radiance of a white surface */
+    float lit;   /* the share of the content's surface that faces a light and is reached by it */
+};
+
 static int ascending(const void *a, const void *b)
 {
     float x = *(const float *)a, y = *(const float *)b;
@@ -60,16 +65,18 @@ static int ascending(const void *a, const void *b)
 }
 
 /* What four fifths of the irradiances stay below that are not next to nothing (outside a cone, behind
- * an emitter), and a third more; 0 where no light reaches anything. */
-static float level_of(float *found, uint32_t count)
+ * an emitter), and a third more; 0 where no light reaches anything. *lit: the share of these. */
+static float level_of(float *found, uint32_t count, float *lit)
 {
     uint32_t dark = 0;
     qsort(found, count, sizeof *found, ascending);
     float most = count ? found[count - 1] : 0;
+    *lit = 0;
     if (!(most > 0) || !isfinite(most))
         return 0;
     while (found[dark] < 1e-3f * most)
         dark++;
+    *lit = (float)(count - dark) / (float)count;
     return 4.0f / 3 * found[dark + (count - dark - 1) * 4 / 5] / GLM_PIf;
 }
 
@@ -105,7 +112,7 @@ static float extent(const struct outline_samples *samples, vec3 middle)
 
 /* The sides that turn away from a lamp are not lit, and must not count; but in many files the sign
  * of a normal says little, and sheets are seen from both sides. The brighter reading is taken. */
-static float measure(
+static struct reading measure(
     const struct light *lights, uint32_t count, const struct outline_samples *samples)
 {
     float facing[OUTLINE_SAMPLES], either[OUTLINE_SAMPLES], beam = 0;
@@ -121,27 +128,46 @@ static float measure(
     }
     for (uint32_t k = 0; k < count; k++)
         beam = fmaxf(beam, in_the_beam(&lights[k], samples, middle, radius));
-    float level = fmaxf(level_of(facing, samples->count), level_of(either, samples->count));
-    return fmaxf(level, BEAM * beam / GLM_PIf);
+    struct reading r;
+    float any;
+    r.level = level_of(facing, samples->count, &r.lit);
+    r.level = fmaxf(r.level, level_of(either, samples->count, &any));
+    r.level = fmaxf(r.level, BEAM * beam / GLM_PIf);
+    return r;
 }
 
-float light_meter(
+/* Where the lights reach the content best: a third above what four fifths of all that they reach stay
+ * below; level 1 without any light that reaches anything. Independent of the camera and, in an
+ * animation, of the time, so that exposure is steady along a sequence: the brightest moment counts. */
+static struct reading meter(
     const struct light *lights, uint32_t count, bool scenes_own, const struct scene *scene)
 {
-    float level = 0;
+    struct reading most = {0, 1};
     for (uint32_t i = 0; i < scene->stage->moment_count; i++) {
         const struct scene_moment *moment = &scene->stage->moments[i];
         struct light moved[PEN_MAX_LIGHTS];
         for (uint32_t k = 0; scenes_own && k < moment->light_count; k++)
             light_emission(&moved[k], &moment->lights[k], scene);
-        level = fmaxf(level, scenes_own ? measure(moved, moment->light_count, &moment->samples)
-                                        : measure(lights, count, &moment->samples));
+        struct reading r = scenes_own ? measure(moved, moment->light_count, &moment->samples)
+                                      : measure(lights, count, &moment->samples);
+        if (r.level > most.level)
+            most = r;
     }
-    return level > 0 ? level : 1;
+    most.level = most.level > 0 ? most.level : 1;
+    return most;
 }
 
-/* What own lights leave in the dark is more of the picture than behind a key light. */
-#define FILL 1.32f
+/* What own lights leave in the dark is more of the picture than behind a key light; of a narrow beam
+ * it is nearly all, and lit by the sky alone. */
+#define FILL 1.04f
+#define FILL_OF_BEAMS 1.32f
+#define BEAMS_LIGHT 0.3f /* of the content, at most */
+
+static float fill_of(float lit)
+{
+    float t = glm_clamp(lit / BEAMS_LIGHT, 0, 1);
+    return glm_lerp(FILL_OF_BEAMS, FILL, t * t * (3 - 2 * t));
+}
 
 /* What faces the lights squarely comes out just below white, with the sky's share on top. The key
  * light is made to measure: its level is 1. */
@@ -149,9 +175,11 @@ void light_choose_exposure(struct pen_request *r, const struct light *lights, ui
     bool scenes_own, const struct scene *scene)
 {
     bool key_light = scenes_own && !scene->blob.light_count;
-    float level = key_light ? 1 : light_meter(lights, count, scenes_own, scene);
+    struct reading found =
+        key_light ? (struct reading){1, 1} : meter(lights, count, scenes_own, scene);
+    float level = found.level;
     if (r->exposure_ev == PEN_AUTO)
         r->exposure_ev = glm_clamp(log2f(0.72f / level), -24, 24);
     if (r->sky_level == PEN_AUTO)
-        r->sky_level = fminf(key_light ? level : FILL * level, 1e6f);
+        r->sky_level = fminf(key_light ? level : fill_of(found.lit) * level, 1e6f);
 }

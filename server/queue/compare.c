@@ -35,7 +35,7 @@ static bool submit(struct compare *c, struct pen_error *error)
                                          : MEASURE_REFERENCE;
     c->waiter.continues = c->at > 0;
     c->waiter.following = request + 1;
-    c->waiter.following_count = c->plan.count - c->at - 1;
+    c->waiter.following_count = c->plan.deadline_ns ? c->plan.count - c->at - 1 : 0;
     c->waiter.fresh = true; /* what one costs is not known from adding to what is there */
     c->waiter.reference_fd = measure_has_reference(c->waiter.measure) ? c->planes_fd : 0;
     return scheduler_submit(c->scheduler, request, key, false, &c->waiter, error);

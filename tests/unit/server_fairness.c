@@ -1,6 +1,7 @@
 /* Whose render is next, for how long, and what is refused because it would be late: with a clock of
  * its own and one renderer that takes as long as it is told. */
 #include "server/base/clock.h"
+#include "server/queue/compare.h"
 #include "server/queue/scheduler.h"
 #include "tests/unit/check.h"
 #include <math.h>
@@ -466,8 +467,47 @@ static void test_sequences(void)
     scheduler_destroy(s);
 }
 
+static void measured(void *owner, struct compare *compare, const struct pen_error *error)
+{
+    *(uint32_t *)owner = 1 + error->code;
+    compare_destroy(compare);
+}
+
+/* Measurements that have their time each are not held to that of one for all of them. */
+static void test_patience(void)
+{
+    struct scheduler *s = make(1000);
+    struct pen_request requests[ITEMS] = {0};
+    struct client other;
+    struct render seen;
+    struct pen_error error = {0};
+    uint32_t over = 0;
+    now_ns = clock_now_ns(); /* that of compare.c */
+    for (int i = 0; i < ITEMS; i++) {
+        requests[i] =
+            (struct pen_request){.width = 100, .height = 100, .antialias = 1, .scene = {1}};
+        snprintf(requests[i].technique, sizeof requests[i].technique, "item %d", i);
+    }
+    struct compare_plan plan = {.requests = requests,
+        .count = ITEMS,
+        .client = 1,
+        .patience_ms = 1500,
+        .done = measured,
+        .owner = &over};
+    CHECK(compare_start(s, &plan, &error)); /* nothing is known */
+    while (run(s, 500, 0, &seen))
+        now_ns = clock_now_ns();
+    CHECK(over == 1);
+    now_ns = clock_now_ns();
+    CHECK(submit(s, &other, (struct ask){"item 0", 1, false, 2, 0, 0}));
+    CHECK(compare_start(s, &plan, &error));
+    scheduler_cancel(s);
+    scheduler_destroy(s);
+}
+
 int main(void)
 {
+    test_patience();
     test_sequences();
     test_time_not_requests();
     test_batch();

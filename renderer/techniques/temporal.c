@@ -240,6 +240,25 @@ static bool catch_up(struct technique_run *run, const struct past *past,
     return ok;
 }
 
+/* A pass over all of `shown`. */
+static bool fill(struct technique_run *run, const char *name, const char *fragment,
+    const struct pass_texture *textures, uint32_t texture_count, const struct temporal_block *block,
+    const struct gl_target *shown, struct pen_error *error)
+{
+    return pass_fill(run->ctx,
+        &(struct pass_fill){.name = name,
+            .fragment = fragment,
+            .stage = PEN_STAGE_TECHNIQUE,
+            .textures = textures,
+            .texture_count = texture_count,
+            .framebuffer = shown->framebuffer,
+            .width = run->width,
+            .height = run->height,
+            .extra = block,
+            .extra_bytes = sizeof *block},
+        error);
+}
+
 /* Into `shown`: what the pixels have, and what they have caught up. The next frame goes on from the
  * former. */
 static bool blend(struct technique_run *run, const struct gl_target *more, uint32_t batches,
@@ -252,18 +271,7 @@ static bool blend(struct technique_run *run, const struct gl_target *more, uint3
     struct pass_texture textures[] = {{UNIT_FRESH, more->texture.name, GL_SAMPLE_NEAREST},
         {UNIT_LAST_MEAN, next->mean.name, GL_SAMPLE_NEAREST},
         {UNIT_LAST_STATE, next->state.name, GL_SAMPLE_NEAREST}};
-    return pass_fill(run->ctx,
-        &(struct pass_fill){.name = "temporal blend",
-            .fragment = "temporal_blend.frag",
-            .stage = PEN_STAGE_TECHNIQUE,
-            .textures = textures,
-            .texture_count = 3,
-            .framebuffer = shown->framebuffer,
-            .width = run->width,
-            .height = run->height,
-            .extra = &block,
-            .extra_bytes = sizeof block},
-        error);
+    return fill(run, "temporal blend", "temporal_blend.frag", textures, 3, &block, shown, error);
 }
 
 /* Of what is shown alone: nothing of it is carried on. */
@@ -280,18 +288,8 @@ static bool smooth(struct technique_run *run, const struct past *past,
         {UNIT_LAST_STATE, next->state.name, GL_SAMPLE_NEAREST},
         {UNIT_PENUMBRA, pass_penumbra_target(run, PENUMBRA_SPREAD)->texture.name,
             GL_SAMPLE_NEAREST}};
-    return pass_fill(run->ctx,
-        &(struct pass_fill){.name = "temporal smoothing",
-            .fragment = "temporal_smooth.frag",
-            .stage = PEN_STAGE_TECHNIQUE,
-            .textures = textures,
-            .texture_count = 5,
-            .framebuffer = shown->framebuffer,
-            .width = run->width,
-            .height = run->height,
-            .extra = &block,
-            .extra_bytes = sizeof block},
-        error);
+    return fill(
+        run, "temporal smoothing", "temporal_smooth.frag", textures, 5, &block, shown, error);
 }
 
 static bool resolve(struct technique_run *run, GLuint mean, struct pen_error *error)

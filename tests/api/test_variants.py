@@ -139,6 +139,19 @@ class Variants(unittest.TestCase):
             for a in shown[method][:4]:
                 self.assertGreater(off_by_more_than(own, a, 8), 100)
 
+    def test_what_the_camera_saw_is_not_kept_for_another(self):
+        """In one view, one straight after the other."""
+        one = self.d.upload(scene(variants=VARIANTS))
+        away = {**VIEW, "camera": {"eye": [-2.5, 2.5, 4], "target": [0, 0.5, 0]}}
+        count = len(VARIANTS)
+        anew = []
+        for k in range(count):
+            self.d.render(one, {**away, "variant": k})
+            anew.append(self.d.render(one, {**VIEW, "variant": k}).body)
+        self.assertGreater(len(set(anew)), 3)
+        for k in list(range(count)) + list(range(0, count, 2)) + list(range(1, count, 2)):
+            self.assertEqual(self.d.render(one, {**VIEW, "variant": k}).body, anew[k], k)
+
     def test_shadows_follow(self):
         """The light through the holes, and past what is half clear, in both back ends of rays."""
         for backend in ("auto", "gpu"):

@@ -43,3 +43,21 @@ void psc_bounds_grow(
         grow(world, corner, min, max);
     }
 }
+
+/* Farther off than this many radii, single precision is coarse for what is drawn. */
+#define NEAR_RADII 64
+
+void psc_choose_origin(const double min[3], const double max[3], double origin[3])
+{
+    double away = 0, radius = 0;
+    for (int k = 0; k < 3; k++) {
+        origin[k] = (min[k] + max[k]) / 2;
+        away += origin[k] * origin[k];
+        radius += (max[k] - min[k]) * (max[k] - min[k]) / 4;
+    }
+    away = sqrt(away), radius = sqrt(radius);
+    /* A point's size is nothing: what doubles still hold exactly has to do. */
+    double step = exp2(floor(log2(fmax(radius, away * 0x1p-40))));
+    for (int k = 0; k < 3; k++)
+        origin[k] = away > NEAR_RADII * radius ? nearbyint(origin[k] / step) * step : 0;
+}

@@ -24,8 +24,8 @@ struct made {
 /* Where an instance is in the file's world. */
 struct place {
     double world[12];
-    double min[3], max[3]; /* posed: its bounds, which the matrix does not tell */
-    bool posed;
+    double min[3], max[3]; /* deforms: its bounds, which the matrix does not tell */
+    bool deforms;
 };
 
 struct psc_builder {
@@ -176,26 +176,6 @@ static uint32_t append_meshlets(struct psc_builder *builder, const struct geomet
     return count;
 }
 
-/* Farther off than this many radii, single precision is coarse for what is drawn. */
-#define NEAR_RADII 64
-
-/* Where to count a box's coordinates from: the world's own origin when that is near, else the box's
- * centre, rounded to about its size, so that equal places mostly give equal origins. */
-static void choose_origin(const double min[3], const double max[3], double origin[3])
-{
-    double away = 0, radius = 0;
-    for (int k = 0; k < 3; k++) {
-        origin[k] = (min[k] + max[k]) / 2;
-        away += origin[k] * origin[k];
-        radius += (max[k] - min[k]) * (max[k] - min[k]) / 4;
-    }
-    away = sqrt(away), radius = sqrt(radius);
-    /* A point's size is nothing: what doubles still hold exactly has to do. */
-    double step = exp2(floor(log2(fmax(radius, away * 0x1p-40))));
-    for (int k = 0; k < 3; k++)
-        origin[k] = away > NEAR_RADII * radius ? nearbyint(origin[k] / step) * step : 0;
-}
-
 static void move_near(struct psc_primitive *p, struct geometry *g, const float base[3])
 {
     double min[3], max[3], origin[3];
@@ -206,7 +186,7 @@ static void move_near(struct psc_primitive *p, struct geometry *g, const float b
             max[k] = fmax(max[k], g->positions[i][k]);
         }
     }
-    choose_origin(min, max, origin);
+    psc_choose_origin(min, max, origin);
     for (int k = 0; k < 3; k++) {
         p->offset[k] = (float)origin[k];
         for (uint32_t i = 0; p->offset[k] != 0 && i < g->vertex_count; i++)
@@ -389,10 +369,11 @@ uint32_t psc_builder_add_instance(
     return psc_builder_place_instance(builder, primitive, wide);
 }
 
-uint32_t psc_builder_place_skinned(
-    struct psc_builder *builder, uint32_t primitive, const double min[3], const double max[3])
+uint32_t psc_builder_place_deforming(struct psc_builder *builder, uint32_t primitive,
+    const double world[12], const double min[3], const double max[3])
 {
-    struct place place = {.world = {1, [5] = 1, [10] = 1}, .posed = true};
+    struct place place = {.deforms = true};
+    memcpy(place.world, world, sizeof place.world);
     memcpy(place.min, min, sizeof place.min);
     memcpy(place.max, max, sizeof place.max);
     return add_instance(builder, primitive, &place);
@@ -417,11 +398,11 @@ static void settle_instances(struct psc_builder *builder, double origin[3])
     double min[3] = {INFINITY, INFINITY, INFINITY}, max[3] = {-INFINITY, -INFINITY, -INFINITY};
     for (size_t i = 0; i < count; i++) {
         const struct psc_primitive *p = &primitives[instances[i].primitive];
-        for (int k = 0; places[i].posed && k < 3; k++) {
+        for (int k = 0; places[i].deforms && k < 3; k++) {
             min[k] = fmin(min[k], places[i].min[k]);
             max[k] = fmax(max[k], places[i].max[k]);
         }
-        for (int c = 0; !places[i].posed && p->index_count && c < 8; c++) {
+        for (int c = 0; !places[i].deforms && p->index_count && c < 8; c++) {
             double corner[3], at[3];
             for (int k = 0; k < 3; k++)
                 corner[k] = (double)(c >> k & 1 ? p->bounds_max[k] : p->bounds_min[k]) +
@@ -433,12 +414,10 @@ static void settle_instances(struct psc_builder *builder, double origin[3])
     }
     memset(origin, 0, 3 * sizeof *origin);
     if (min[0] <= max[0])
-        choose_origin(min, max, origin);
+        psc_choose_origin(min, max, origin);
     for (size_t i = 0; i < count; i++) {
         const float *offset = primitives[instances[i].primitive].offset;
         double at[3];
-        if (places[i].posed)
-            continue;
         psc_affine_point(places[i].world, (double[3]){offset[0], offset[1], offset[2]}, at);
         for (int k = 0; k < 3; k++)
             instances[i].world[4 * k + 3] = (float)(at[k] - origin[k]);

@@ -68,9 +68,9 @@ uint32_t psc_builder_add_instance(
     struct psc_builder *builder, uint32_t primitive, const float world[12]);
 uint32_t psc_builder_place_instance(
     struct psc_builder *builder, uint32_t primitive, const double world[12]);
-/* One whose vertices joints place: `min`, `max` are its bounds in the file's world at rest. */
-uint32_t psc_builder_place_skinned(
-    struct psc_builder *builder, uint32_t primitive, const double min[3], const double max[3]);
+/* One whose vertices move: `min`, `max` are its bounds in the file's world at rest. */
+uint32_t psc_builder_place_deforming(struct psc_builder *builder, uint32_t primitive,
+    const double world[12], const double min[3], const double max[3]);
 void psc_builder_hide_instance(struct psc_builder *builder, uint32_t instance);
 
 /* A default material: base colour white, roughness 1, metallic 0, no textures. */

@@ -48,8 +48,8 @@ struct psc_joint {
 enum psc_deform_flags { PSC_DEFORM_FLAT = 1 }; /* no normals given: those of the posed triangles */
 
 /* A primitive whose vertices move. Its positions, normals and tangents in the blob are those of the
- * rest pose: in the blob's world when it is skinned (its one instance then is the identity, or mirrors
- * x when the joints mirror), else in object space. */
+ * rest pose: in the world when it is skinned (its one instance then moves them and, when the joints
+ * mirror, mirrors x), else in object space. Its instances ride on nodes. */
 struct psc_deform {
     uint32_t primitive;
     int32_t skin;             /* -1: only morphed */

@@ -9,7 +9,7 @@
 #include <stdint.h>
 
 #define PSC_MAGIC "PSCENE\r\n"
-#define PSC_VERSION 7u
+#define PSC_VERSION 8u
 #define PSC_MESHLET_TRIANGLES 128u /* at most, per meshlet */
 
 enum psc_section_id {
@@ -83,7 +83,8 @@ struct psc_primitive {
     uint32_t flags;
     float bounds_min[3], bounds_max[3]; /* object space */
     /* What was taken off the file's vertices, because they lie far from their origin; instances'
-     * matrices have it already. */
+     * matrices have it already. Of what deforms: taken off PSC_BIND; what its positions lack is
+     * known to its instances alone. */
     float offset[3];
 };
 

@@ -24,9 +24,14 @@ static void cut_motion(struct psc_header *file, size_t *bytes)
     file->file_bytes = *bytes = at;
 }
 
-/* The builder left out what deforms. */
-static void add_extent(struct psc_header *file, const struct pose *pose)
+/* The builder left out what deforms, and knows its own origin alone. */
+static void finish_extent(struct psc_header *file, const struct pose *pose)
 {
+    for (int k = 0; k < 3; k++) {
+        double away = file->origin[k] - pose_scene(pose)->header->origin[k];
+        file->extent_min[k] = (float)(file->extent_min[k] + away);
+        file->extent_max[k] = (float)(file->extent_max[k] + away);
+    }
     const struct psc_motion *m = &pose->rest->motion;
     bool *deforms = pen_alloc_zero(pose->rest->primitive_count, sizeof *deforms);
     for (uint32_t i = 0; i < m->deform_count; i++)
@@ -48,20 +53,24 @@ bool pose_bake(void *data, size_t *bytes, struct pen_error *error)
     uint32_t changes;
     if (!psc_open_memory(data, *bytes, &built, error))
         return false;
-    if (built.motion.deform_count) {
+    /* Where anything can be posed, it is at rest as a pose has it. */
+    if (built.motion.deform_count || built.motion.animation_count || built.motion.variant_count) {
         struct pose *pose = pose_create(&built);
         bool done = pose_set(pose, -1, 0, &changes, error);
         const struct psc_scene *posed = pose_scene(pose);
         if (done) {
-            put(file, PSC_POSITIONS, posed->positions);
-            put(file, PSC_ATTRIBUTES, posed->attributes);
-            put(file, PSC_MESHLETS, posed->meshlets);
-            put(file, PSC_PRIMITIVES, posed->primitives);
+            if (built.motion.deform_count) {
+                put(file, PSC_POSITIONS, posed->positions);
+                put(file, PSC_ATTRIBUTES, posed->attributes);
+                put(file, PSC_MESHLETS, posed->meshlets);
+                put(file, PSC_PRIMITIVES, posed->primitives);
+            }
             put(file, PSC_INSTANCES, pose_instances(pose));
             memcpy(file->bounds_min, posed->header->bounds_min, sizeof file->bounds_min);
             memcpy(file->bounds_max, posed->header->bounds_max, sizeof file->bounds_max);
             file->triangles = posed->header->triangles;
-            add_extent(file, pose);
+            finish_extent(file, pose);
+            memcpy(file->origin, posed->header->origin, sizeof file->origin);
         } else if (error && !strcmp(error->pointer, "/time_s"))
             pen_fail(error, PEN_INVALID, "", "At rest, skins move something beyond 1e12 m.");
         pose_destroy(pose);

@@ -31,8 +31,8 @@ static double turn_normal(const double m[12], const double n[3], double out[3])
     return determinant;
 }
 
-static void skin_vertex(const struct pose *pose, const double (*joints)[12],
-    const struct psc_influence *influences, uint32_t count, struct vertex *v, int *sides)
+static void skin_vertex(const double (*joints)[12], const struct psc_influence *influences,
+    uint32_t count, struct vertex *v, int *sides)
 {
     double m[12] = {0}, sum = 0;
     struct vertex out;
@@ -44,8 +44,6 @@ static void skin_vertex(const struct pose *pose, const double (*joints)[12],
             m[k] += weight * joint[k];
     }
     psc_affine_point(m, v->position, out.position);
-    for (int k = 0; k < 3; k++)
-        out.position[k] -= pose->rest->header->origin[k];
     *sides += turn_normal(m, v->normal, out.normal) < 0 ? -1 : 1;
     for (int r = 0; r < 3; r++)
         out.tangent[r] =
@@ -63,10 +61,10 @@ static bool store_direction(const double v[3], bool mirrored, int16_t out[4])
     return true;
 }
 
-static void load(struct vertex *v, const struct psc_bind *bind)
+static void load(struct vertex *v, const struct psc_bind *bind, const float offset[3])
 {
     for (int k = 0; k < 3; k++) {
-        v->position[k] = bind->position[k];
+        v->position[k] = (double)bind->position[k] + offset[k];
         v->normal[k] = bind->normal[k];
         v->tangent[k] = bind->tangent[k];
     }
@@ -150,39 +148,62 @@ static bool inputs_changed(struct pose *pose, uint32_t number)
     return true;
 }
 
-/* Skinned vertices lie in the world already. Joints that mirror turn the winding round, as a
+/* Skinned vertices lie in the file's world already. Joints that mirror turn the winding round, as a
  * mirroring node does; the instance then mirrors x, and its vertices the other way. */
-static void place_instance(struct pose *pose, uint32_t number, bool mirrored, uint32_t *changes)
+static void place_skinned(
+    struct pose *pose, const struct psc_deform *d, bool mirrored, uint32_t *changes)
 {
-    struct psc_instance *instance = &pose->instances[number];
-    const float world[12] = {mirrored ? -1 : 1, [5] = 1, [10] = 1};
+    struct psc_instance *instance = &pose->instances[d->instance];
+    const double *at = pose->offsets[d->primitive];
+    const double place[12] = {
+        mirrored ? -1 : 1, [3] = at[0], [5] = 1, [7] = at[1], [10] = 1, [11] = at[2]};
     uint32_t flags = (instance->flags & (uint32_t)PSC_HIDDEN) | (mirrored ? PSC_MIRRORED : 0);
     if (instance->flags != flags)
         *changes |= POSE_STATE;
-    if (memcmp(instance->world, world, sizeof world))
-        *changes |= POSE_INSTANCES;
-    memcpy(instance->world, world, sizeof world);
     instance->flags = flags;
+    memcpy(pose->places[d->instance], place, sizeof place);
+    pose->placed[d->instance] = true;
 }
 
-static bool store(struct pose *pose, const struct psc_deform *d, const struct psc_primitive *p,
+/* Where to count the vertices from: as at rest, unless they are far from that. False when one leaves
+ * the range of coordinates. */
+static bool choose_offset(struct pose *pose, const struct psc_deform *d,
+    const struct psc_primitive *p, const struct vertex *vertices)
+{
+    double min[3] = {INFINITY, INFINITY, INFINITY}, max[3] = {-INFINITY, -INFINITY, -INFINITY};
+    double rest[3], away[3] = {0};
+    for (int k = 0; k < 3; k++) {
+        rest[k] = d->skin >= 0 ? pose->rest->header->origin[k] : (double)p->offset[k];
+        for (uint32_t i = 0; i < p->vertex_count; i++) {
+            if (!(fabs(vertices[i].position[k]) <= FARTHEST))
+                return false;
+            min[k] = fmin(min[k], vertices[i].position[k] - rest[k]);
+            max[k] = fmax(max[k], vertices[i].position[k] - rest[k]);
+        }
+    }
+    if (p->vertex_count)
+        psc_choose_origin(min, max, away);
+    for (int k = 0; k < 3; k++)
+        pose->offsets[d->primitive][k] = rest[k] + away[k];
+    return true;
+}
+
+static void store(struct pose *pose, const struct psc_deform *d, const struct psc_primitive *p,
     const struct vertex *vertices, bool mirrored)
 {
     const struct psc_bind *binds = pose->rest->motion.binds + d->first_bind;
+    const double *offset = pose->offsets[d->primitive];
     for (uint32_t i = 0; i < p->vertex_count; i++) {
         const struct vertex *v = &vertices[i];
         struct psc_attributes *a = &pose->attributes[p->first_vertex + i];
         for (int k = 0; k < 3; k++) {
-            if (!(fabs(v->position[k]) <= FARTHEST))
-                return false;
-            pose->positions[p->first_vertex + i][k] =
-                (float)(mirrored && k == 0 ? -v->position[k] : v->position[k]);
+            float x = (float)(v->position[k] - offset[k]);
+            pose->positions[p->first_vertex + i][k] = mirrored && k == 0 ? -x : x;
         }
         store_direction(v->normal, mirrored, a->normal);
         if (binds[i].tangent[3] != 0)
             store_direction(v->tangent, mirrored, a->tangent);
     }
-    return true;
 }
 
 bool pose_deform(struct pose *pose, uint32_t number, uint32_t *changes)
@@ -195,18 +216,20 @@ bool pose_deform(struct pose *pose, uint32_t number, uint32_t *changes)
         return true;
     struct vertex *vertices = pen_alloc(p->vertex_count, sizeof *vertices);
     for (uint32_t i = 0; i < p->vertex_count; i++)
-        load(&vertices[i], &m->binds[d->first_bind + i]);
+        load(&vertices[i], &m->binds[d->first_bind + i], p->offset);
     morph(vertices, m, d, pose->weights);
     for (uint32_t i = 0; d->skin >= 0 && i < p->vertex_count; i++)
-        skin_vertex(pose, (const double(*)[12])pose->joints + m->skins[d->skin].first_joint,
+        skin_vertex((const double(*)[12])pose->joints + m->skins[d->skin].first_joint,
             m->influences + d->first_influence + (size_t)i * d->influences, d->influences,
             &vertices[i], &sides);
-    bool fits = store(pose, d, p, vertices, sides < 0);
+    bool fits = choose_offset(pose, d, p, vertices);
+    if (fits)
+        store(pose, d, p, vertices, sides < 0);
     free(vertices);
     if (!fits)
         return false;
     if (d->skin >= 0)
-        place_instance(pose, (uint32_t)d->instance, sides < 0, changes);
+        place_skinned(pose, d, sides < 0, changes);
     if (d->flags & PSC_DEFORM_FLAT)
         flat_normals(pose, p);
     find_bounds(pose, p);

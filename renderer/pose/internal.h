@@ -23,6 +23,10 @@ struct pose {
 
     double (*worlds)[12]; /* of nodes */
     bool *hidden;
+    double (*places)[12]; /* of instances that ride or are skinned, in the file's world */
+    bool *placed;         /* those */
+    double (*offsets)[3]; /* taken off the vertices of primitives: in object space, skinned ones in
+                              the file's world */
     double (*joints)[12]; /* of all skins */
     bool *skin_moved;     /* since the last pose */
 
@@ -50,5 +54,6 @@ void pose_apply_channels(struct pose *pose, const struct psc_animation *animatio
 
 /* deform.c: the joints of all skins. */
 void pose_place_joints(struct pose *pose);
-/* False when a vertex leaves the range of coordinates. */
+/* Relative to an offset that suits where they are, which is left with the pose. False when a vertex
+ * leaves the range of coordinates. */
 bool pose_deform(struct pose *pose, uint32_t number, uint32_t *changes);

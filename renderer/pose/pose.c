@@ -68,6 +68,12 @@ struct pose *pose_create(const struct psc_scene *rest)
     pose->channel_values = copy(NULL, most_components(m), sizeof *pose->channel_values);
     pose->worlds = copy(NULL, m->node_count, sizeof *pose->worlds);
     pose->hidden = copy(NULL, m->node_count, sizeof *pose->hidden);
+    pose->places = copy(NULL, rest->instance_count, sizeof *pose->places);
+    pose->placed = copy(NULL, rest->instance_count, sizeof *pose->placed);
+    pose->offsets = copy(NULL, rest->primitive_count, sizeof *pose->offsets);
+    for (uint32_t i = 0; i < rest->primitive_count; i++)
+        for (int k = 0; k < 3; k++)
+            pose->offsets[i][k] = rest->primitives[i].offset[k];
     pose->joints = copy(NULL, m->joint_count, sizeof *pose->joints);
     pose->skin_moved = copy(NULL, m->skin_count, sizeof *pose->skin_moved);
     if (m->deform_count) { /* else no vertex moves */
@@ -108,10 +114,11 @@ void pose_destroy(struct pose *pose)
     for (uint32_t i = 0; i < pose->rest->motion.deform_count; i++)
         free(pose->deforms[i].weights);
     void *const owned[] = {pose->nodes, pose->weights, pose->material_rests, pose->light_rests,
-        pose->alphas, pose->channel_values, pose->worlds, pose->hidden, pose->joints,
-        pose->skin_moved, pose->positions, pose->attributes, pose->meshlets, pose->primitives,
-        pose->instances, pose->shown, pose->materials, pose->lights, pose->cameras,
-        pose->instance_bounds, pose->instance_dirty, pose->deforms, pose->moved};
+        pose->alphas, pose->channel_values, pose->worlds, pose->hidden, pose->places, pose->placed,
+        pose->offsets, pose->joints, pose->skin_moved, pose->positions, pose->attributes,
+        pose->meshlets, pose->primitives, pose->instances, pose->shown, pose->materials,
+        pose->lights, pose->cameras, pose->instance_bounds, pose->instance_dirty, pose->deforms,
+        pose->moved};
     for (size_t i = 0; i < sizeof owned / sizeof *owned; i++)
         free(owned[i]);
     free(pose);
@@ -201,46 +208,53 @@ static double determinant(const float m[12])
            (double)m[2] * ((double)m[4] * (double)m[9] - (double)m[5] * (double)m[8]);
 }
 
-/* From the file's world and the file's vertices to the blob's. */
-static void to_origin(const struct pose *pose, const struct psc_instance *instance, double m[12])
-{
-    const struct psc_primitive *p = &pose->rest->primitives[instance->primitive];
-    double offset[3], at[3];
-    for (int k = 0; k < 3; k++)
-        offset[k] = p->offset[k];
-    psc_affine_point(m, offset, at);
-    for (int k = 0; k < 3; k++)
-        m[4 * k + 3] = at[k] - pose->rest->header->origin[k];
-}
-
-static bool place_instance(struct pose *pose, const struct psc_rider *rider, uint32_t *changes)
+/* Where a node carries an instance, for the vertices as they are kept. */
+static bool ride(struct pose *pose, const struct psc_rider *rider, uint32_t *changes)
 {
     struct psc_instance *instance = &pose->instances[rider->item];
     uint32_t hidden = pose->hidden[rider->node] ? PSC_HIDDEN : 0;
     uint32_t flags = (instance->flags & (uint32_t)PSC_MIRRORED) | hidden;
     if (!(rider->flags & PSC_RIDER_SKINNED)) {
-        double local[12], world[12];
-        float placed[12];
+        double local[12], at[3], *world = pose->places[rider->item];
+        float linear[12];
         for (int k = 0; k < 12; k++)
             local[k] = rider->local[k];
         psc_affine_multiply(pose->worlds[rider->node], local, world);
-        to_origin(pose, instance, world);
+        psc_affine_point(world, pose->offsets[instance->primitive], at);
         for (int k = 0; k < 12; k++) {
+            if (k % 4 == 3)
+                world[k] = at[k / 4];
             if (!(fabs(world[k]) <= FARTHEST))
                 return false;
-            placed[k] = (float)world[k];
+            linear[k] = (float)world[k];
         }
-        if (memcmp(placed, instance->world, sizeof placed)) {
-            memcpy(instance->world, placed, sizeof placed);
-            pose->instance_dirty[rider->item] = true;
-            *changes |= POSE_INSTANCES;
-        }
-        flags = hidden | (determinant(placed) < 0 ? PSC_MIRRORED : 0);
+        pose->placed[rider->item] = true;
+        flags = hidden | (determinant(linear) < 0 ? PSC_MIRRORED : 0);
     }
     if (flags != instance->flags)
         *changes |= POSE_STATE;
     instance->flags = flags;
     return true;
+}
+
+/* All matrices, relative to an origin of the file's world. */
+static void place_instances(struct pose *pose, const double origin[3], uint32_t *changes)
+{
+    const struct psc_header *rest = pose->rest->header;
+    memcpy(pose->header.origin, origin, sizeof pose->header.origin);
+    for (uint32_t i = 0; i < pose->rest->instance_count; i++) {
+        float world[12];
+        memcpy(world, pose->rest->instances[i].world, sizeof world);
+        for (int k = 0; pose->placed[i] && k < 12; k++)
+            world[k] = (float)(pose->places[i][k] - (k % 4 == 3 ? origin[k / 4] : 0));
+        for (int k = 0; !pose->placed[i] && k < 3; k++)
+            world[4 * k + 3] = (float)(world[4 * k + 3] + (rest->origin[k] - origin[k]));
+        if (!memcmp(world, pose->instances[i].world, sizeof world))
+            continue;
+        memcpy(pose->instances[i].world, world, sizeof world);
+        pose->instance_dirty[i] = true;
+        *changes |= POSE_INSTANCES;
+    }
 }
 
 static bool place_riders(struct pose *pose, uint32_t *changes)
@@ -250,7 +264,7 @@ static bool place_riders(struct pose *pose, uint32_t *changes)
         const struct psc_rider *rider = &m->riders[i];
         const double *world = pose->worlds[rider->node];
         if (rider->kind == PSC_RIDER_INSTANCE) {
-            if (!place_instance(pose, rider, changes))
+            if (!ride(pose, rider, changes))
                 return false;
         } else if (rider->kind == PSC_RIDER_LIGHT) {
             struct pen_light *light = &pose->lights[rider->item].light;
@@ -292,6 +306,37 @@ static void find_bounds(struct pose *pose)
     }
 }
 
+static bool is_finite_scene(const struct pose *pose)
+{
+    const struct psc_header *h = &pose->header;
+    for (int k = 0; k < 3; k++)
+        if (!isfinite(h->bounds_min[k]) || !isfinite(h->bounds_max[k]))
+            return false;
+    return true;
+}
+
+/* Matrices and bounds, relative to the blob's origin or, when the pose is far from that, to one of its
+ * own. */
+static bool settle(struct pose *pose, uint32_t *changes)
+{
+    const struct psc_header *h = &pose->header;
+    double min[3], max[3], away[3], origin[3];
+    place_instances(pose, pose->rest->header->origin, changes);
+    find_bounds(pose);
+    for (int k = 0; k < 3; k++)
+        min[k] = h->bounds_min[k], max[k] = h->bounds_max[k];
+    if (!is_finite_scene(pose) || !(min[0] <= max[0]))
+        return is_finite_scene(pose);
+    psc_choose_origin(min, max, away);
+    if (away[0] == 0 && away[1] == 0 && away[2] == 0)
+        return true;
+    for (int k = 0; k < 3; k++)
+        origin[k] = pose->rest->header->origin[k] + away[k];
+    place_instances(pose, origin, changes);
+    find_bounds(pose);
+    return true;
+}
+
 static void show_instances(struct pose *pose)
 {
     pose->scene.instance_count = 0;
@@ -311,15 +356,6 @@ static void mark_moved(struct pose *pose)
     for (uint32_t i = 0; i < pose->rest->instance_count; i++)
         pose->instance_dirty[i] |= moved[pose->instances[i].primitive];
     free(moved);
-}
-
-static bool is_finite_scene(const struct pose *pose)
-{
-    const struct psc_header *h = &pose->header;
-    for (int k = 0; k < 3; k++)
-        if (!isfinite(h->bounds_min[k]) || !isfinite(h->bounds_max[k]))
-            return false;
-    return true;
 }
 
 static void finish_materials(struct pose *pose, uint32_t *changes)
@@ -350,7 +386,7 @@ bool pose_set(
     finish_materials(pose, changes);
     for (uint32_t i = 0; i < m->light_rest_count; i++)
         pose_light_power(&pose->lights[pose->light_rests[i].light].light, &pose->light_rests[i]);
-    fits = find_worlds(pose) && place_riders(pose, changes);
+    fits = find_worlds(pose);
     if (fits)
         pose_place_joints(pose);
     for (uint32_t i = 0; fits && i < m->deform_count; i++)
@@ -359,10 +395,9 @@ bool pose_set(
         pose->deforms[i].made = false; /* nobody knows of which pose */
     *changes |= POSE_LIGHTS;
     mark_moved(pose);
+    fits = fits && place_riders(pose, changes) && settle(pose, changes);
     show_instances(pose);
-    if (fits)
-        find_bounds(pose);
-    if (!fits || !is_finite_scene(pose))
+    if (!fits)
         return pen_fail(error, PEN_INVALID, "/time_s",
             "At this moment the animation moves something beyond 1e12 m.");
     return true;

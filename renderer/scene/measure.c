@@ -8,9 +8,14 @@
 #include <stdlib.h>
 #include <string.h>
 
+#define GROUND 12 /* radii that it reaches */
+
 float scene_floor(const struct scene *s)
 {
-    float stage = fminf(s->stage->floor, s->rest_stage.floor);
+    double away = s->rest_stage.origin[1] - s->blob.header->origin[1];
+    float stage = s->stage->floor, rest = s->rest_stage.floor + (float)away;
+    if (stage - rest < GROUND * scene_radius(s)) /* else it is not seen */
+        stage = fminf(stage, rest);
     return scene_is_empty(s) ? stage : fminf(stage, s->blob.header->bounds_min[1]);
 }
 
@@ -20,7 +25,7 @@ void scene_ground(const struct scene *s, float ground[4])
     scene_center(s, ground);
     /* A hair below the bounds, so that a floor of the scene itself hides it. */
     ground[1] = (scene_is_empty(s) ? 0 : scene_floor(s)) - 1e-4f * radius;
-    ground[3] = 12 * radius;
+    ground[3] = GROUND * radius;
 }
 
 bool scene_is_empty(const struct scene *s)
@@ -112,4 +117,9 @@ void scene_measure(struct scene *s)
         s->moving_animation = s->pose.animation;
     }
     s->stage = s->pose.animation >= 0 ? &s->moving_stage : &s->rest_stage;
+    if (memcmp(s->stage->origin, s->blob.header->origin, sizeof s->stage->origin)) {
+        stage_finish(&s->moved_stage);
+        stage_move(s->stage, s->blob.header->origin, &s->moved_stage);
+        s->stage = &s->moved_stage;
+    }
 }

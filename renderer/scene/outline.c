@@ -34,7 +34,8 @@ static void direction(uint32_t i, float d[3])
     d[0] = r * cosf(turn), d[1] = z, d[2] = r * sinf(turn);
 }
 
-void outline_grow(struct outline *o, const struct psc_scene *s, const float (*content)[3])
+void outline_grow(
+    struct outline *o, const struct psc_scene *s, const float (*content)[3], const float shift[3])
 {
     float directions[OUTLINE_DIRECTIONS][3];
     bool any = o->extreme_count > 0;
@@ -59,6 +60,8 @@ void outline_grow(struct outline *o, const struct psc_scene *s, const float (*co
             if (!is_inside(at, content))
                 continue;
             any = true;
+            for (int k = 0; k < 3; k++)
+                at[k] += shift[k];
             for (uint32_t i = 0; i < OUTLINE_DIRECTIONS; i++) {
                 const float *d = directions[i];
                 float along = at[0] * d[0] + at[1] * d[1] + at[2] * d[2];
@@ -117,11 +120,14 @@ static double walk(struct outline_samples *o, const struct psc_scene *s, const f
     return area;
 }
 
-void outline_sample(
-    struct outline_samples *samples, const struct psc_scene *scene, const float (*content)[3])
+void outline_sample(struct outline_samples *samples, const struct psc_scene *scene,
+    const float (*content)[3], const float shift[3])
 {
     samples->count = 0;
     double area = walk(samples, scene, content, false, 0);
     if (area > 0)
         walk(samples, scene, content, true, area / OUTLINE_SAMPLES);
+    for (uint32_t i = 0; i < samples->count; i++)
+        for (int k = 0; k < 3; k++)
+            samples->at[i].point[k] += shift[k];
 }

@@ -20,8 +20,9 @@ struct outline_samples {
     uint32_t count;
 };
 
-/* By what of the scene lies inside the world bounds `content`; a zeroed outline is empty. */
-void outline_grow(
-    struct outline *outline, const struct psc_scene *scene, const float (*content)[3]);
-void outline_sample(
-    struct outline_samples *samples, const struct psc_scene *scene, const float (*content)[3]);
+/* By what of the scene lies inside the world bounds `content`, moved by `shift`; a zeroed outline is
+ * empty. */
+void outline_grow(struct outline *outline, const struct psc_scene *scene, const float (*content)[3],
+    const float shift[3]);
+void outline_sample(struct outline_samples *samples, const struct psc_scene *scene,
+    const float (*content)[3], const float shift[3]);

@@ -443,6 +443,7 @@ void scene_destroy(struct scene *s)
     pose_destroy(s->poses);
     stage_finish(&s->rest_stage);
     stage_finish(&s->moving_stage);
+    stage_finish(&s->moved_stage);
     psc_close(&s->file);
     free(s);
 }

@@ -65,7 +65,8 @@ struct scene {
     float (*instance_bounds)[2][3]; /* world */
     struct scene_stage rest_stage, moving_stage;
     int32_t moving_animation;        /* that moving_stage is of; -1: none yet */
-    const struct scene_stage *stage; /* one of the two */
+    struct scene_stage moved_stage;  /* one of them, for a pose with an origin of its own */
+    const struct scene_stage *stage; /* one of these */
     bool has_emission, has_unlit;
     bool has_blend;
     bool may_blend; /* in some variant */
@@ -102,7 +103,7 @@ bool scene_set_pose(
     struct scene *scene, const struct pen_request *request, struct pen_error *error);
 /* measure.c: of the scene as posed, once it is; everything below follows from it. */
 void scene_measure(struct scene *scene);
-/* What a ground lies under, m: the stage's lowest point, or that of the rest pose. */
+/* What a ground lies under, m: the stage's lowest point, or that of the rest pose where it is near. */
 float scene_floor(const struct scene *scene);
 /* The square that a ground is: centre x, height, centre z, half side. */
 void scene_ground(const struct scene *scene, float ground[4]);

@@ -12,6 +12,7 @@ struct scene_moment {
 };
 
 struct scene_stage {
+    double origin[3];    /* in the file's world, of all that follows */
     float content[2][3]; /* world bounds without a flat floor that everything stands on; min > max:
                             empty */
     float floor;         /* the lowest point; infinite: empty */
@@ -26,4 +27,6 @@ void stage_make(
 /* Of moments spread evenly over an animation; those that move something out of range are left out. */
 void stage_make_animated(
     struct scene_stage *stage, const struct psc_scene *file, int32_t animation);
+/* A copy of it, relative to another origin, into an unused *to. */
+void stage_move(const struct scene_stage *stage, const double origin[3], struct scene_stage *to);
 void stage_finish(struct scene_stage *stage); /* a zeroed one is fine */

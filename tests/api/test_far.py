@@ -61,17 +61,17 @@ class Far(unittest.TestCase):
         self.assertEqual(answer.status, 200, answer.body[:300])
         return rgb(answer)
 
-    def same(self, scene, offset=(0, 0, 0), scale=1.0, names=("pcss", "raytraced")):
+    def same(self, scene, offset=(0, 0, 0), scale=1.0, names=("pcss", "raytraced"), **pose):
         """Default request, then each light with a camera that moved along."""
         expected = self.picture(self.near)
         self.assertGreater(len(set(expected)), 100)
-        self.assertLessEqual(off_by_more_than(expected, self.picture(scene), 8), MOST_OFF)
+        self.assertLessEqual(off_by_more_than(expected, self.picture(scene, **pose), 8), MOST_OFF)
         for name in names:
             for kind in ("rect", "sphere", "sun") if name == "pcss" else ("rect",):
                 with self.subTest(method=name, light=kind):
                     more = {"technique": {"name": name}, "output": {"layer": "visibility"}}
                     expected = self.picture(self.near, **view(kind=kind), **more)
-                    seen = self.picture(scene, **view(offset, scale, kind), **more)
+                    seen = self.picture(scene, **view(offset, scale, kind), **more, **pose)
                     self.assertLessEqual(off_by_more_than(expected, seen, 16), MOST_OFF)
 
     def check_bounds(self, scene, offset, scale=1.0):
@@ -109,6 +109,55 @@ class Far(unittest.TestCase):
                 with self.subTest(mode=mode, offset=offset):
                     far = self.picture(scan(offset, mode))
                     self.assertLessEqual(off_by_more_than(near, far, 8), MOST_OFF)
+
+    def test_morphed_far_away(self):
+        """Vertices at the origin, and a morph target that takes all of them away: at rest, with
+        time, and back again from a node that is there."""
+        def scene(shift, weight, node=(0, 0, 0)):
+            points, normals, indices = stairs()
+            b = pose_files.Builder()
+            b.json["meshes"].append({"weights": [weight], "primitives": [{
+                "attributes": {"POSITION": b.floats("VEC3", points),
+                               "NORMAL": b.floats("VEC3", normals)},
+                "indices": b.accessor("SCALAR", 5123, "H", [[i] for i in indices]),
+                "targets": [{"POSITION": b.floats("VEC3", [shift] * len(points))}]}]})
+            b.node(True, mesh=0, translation=list(node))
+            if not weight:
+                b.animate("go", [(0, "weights", [0.5], [[1]], "STEP")])
+            return self.d.upload(b.glb())
+        for offset in (UTM, (1e6, 0, 0)):
+            with self.subTest(offset=offset):
+                rests = scene(offset, 1)
+                self.check_bounds(rests, offset)
+                self.same(rests, offset)
+                self.same(scene(offset, 0), offset, animation="go", names=("raytraced",))
+        back = scene([-x for x in UTM], 1, UTM)
+        self.check_bounds(back, (0, 0, 0))
+        self.same(back)
+
+    def test_animated_far_away(self):
+        """Nodes that time takes away, all of them or a character's joints."""
+        points, normals, indices = stairs()
+        for skinned in (False, True):
+            b = pose_files.Builder()
+            attributes = {"POSITION": b.floats("VEC3", points), "NORMAL": b.floats("VEC3", normals)}
+            if skinned:
+                ones = [[0, 0, 0, 0]] * len(points)
+                attributes["JOINTS_0"] = b.accessor("VEC4", 5121, "B", ones)
+                attributes["WEIGHTS_0"] = b.floats("VEC4", [[1, 0, 0, 0]] * len(points))
+            b.json["meshes"].append({"primitives": [{
+                "attributes": attributes,
+                "indices": b.accessor("SCALAR", 5123, "H", [[i] for i in indices])}]})
+            top = b.node(True, **({} if skinned else {"mesh": 0}))
+            if skinned:
+                b.json["skins"] = [{"joints": [top]}]
+                b.node(True, mesh=0, skin=0)
+            b.animate("go", [(top, "translation", [0.5], [ECEF], "STEP")])
+            scene = self.d.upload(b.glb())
+            with self.subTest(skinned=skinned):
+                self.same(scene)
+                self.same(scene, ECEF, animation="go")
+                self.same(scene, names=())
 
     def test_far_vertices_brought_back_by_the_node(self):
         scene = self.d.upload(mesh_scene(*stairs(UTM), node={"translation": [-x for x in UTM]}))

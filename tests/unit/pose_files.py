@@ -181,6 +181,39 @@ def morphed(seed):
     return b.glb()
 
 
+def morphed_far(seed, shift, back=(0, 0, 0)):
+    """A mesh that a target takes far away at rest, as a whole, while another one bends it; beside it
+    the same mesh that goes there with time."""
+    r, b = random.Random(seed), Builder()
+    positions, given, triangles = tube(r)
+    n = len(positions)
+    bend = [[0.2 * r.gauss(0, 1) for _ in range(3)] for _ in range(n)]
+    b.json["meshes"].append({"weights": [1, 0.5], "primitives": [{
+        "attributes": {"POSITION": b.floats("VEC3", positions), "NORMAL": b.floats("VEC3", given)},
+        "indices": b.accessor("SCALAR", 5125, "I", [[i] for i in triangles]),
+        "targets": [{"POSITION": b.floats("VEC3", [shift] * n)},
+                    {"POSITION": b.floats("VEC3", bend)}]}]})
+    b.node(True, mesh=0, translation=list(back))
+    moving = b.node(True, mesh=0, translation=[x + 1 for x in back], weights=[1, 0])
+    b.animate("go", [(moving, "weights", [0, 1, 2], [[1], [0], [1], [1], [1], [0.3]], "LINEAR")])
+    return b.glb()
+
+
+def nodes_far(seed, to):
+    """All that there is goes far away."""
+    r, b = random.Random(seed), Builder()
+    positions, given, triangles = tube(r)
+    b.json["meshes"].append({"primitives": [{
+        "attributes": {"POSITION": b.floats("VEC3", positions), "NORMAL": b.floats("VEC3", given)},
+        "indices": b.accessor("SCALAR", 5125, "I", [[i] for i in triangles])}]})
+    top = b.node(True, children=[1, 2])
+    b.node(mesh=0, rotation=unit(r, 4))
+    b.node(mesh=0, translation=[1, 2, 3])
+    b.animate("go", [(top, "translation", [0, 0.1, 1], [[0, 0, 0], to, to], "LINEAR"),
+                     (top, "rotation", [0, 1], [unit(r, 4), unit(r, 4)], "LINEAR")])
+    return b.glb()
+
+
 def skinned_and_morphed(seed):
     r, b = random.Random(seed), Builder()
     positions, _, triangles = tube(r)
@@ -212,4 +245,9 @@ def all_files():
     yield "skin-flat.glb", skinned(4, 1, normals=False)
     yield "skin-far.glb", skinned(7, 1, at=(500000, 30, -4000000))
     yield "morph.glb", morphed(5)
+    yield "morph-far.glb", morphed_far(8, (1e6, 0, 0))
+    yield "morph-utm.glb", morphed_far(9, (500000.5, 250, -4649776))
+    yield "morph-back.glb", morphed_far(10, (-500000.5, -250, 4649776),
+                                        back=(500000.5, 250, -4649776))
+    yield "nodes-far.glb", nodes_far(11, (-3178068.5, 6378137, 4487348))
     yield "skin-morph.glb", skinned_and_morphed(6)

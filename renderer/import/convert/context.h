@@ -52,7 +52,7 @@ struct imp_context {
 
     double bounds_min[3], bounds_max[3]; /* world, over the instances so far; min > max: none */
     struct primitive_bounds {
-        float min[3], max[3];
+        double min[3], max[3];
     } * primitive_bounds; /* object space, by glTF primitive */
 
     struct imp_motion *motion; /* motion.h */

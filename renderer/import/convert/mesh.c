@@ -272,8 +272,8 @@ static bool add(struct imp_context *context, uint32_t number, struct imp_geometr
         bounds->min[k] = bounds->max[k] = g->positions[0][k];
     for (uint32_t i = 1; i < g->vertex_count; i++)
         for (int k = 0; k < 3; k++) {
-            bounds->min[k] = fminf(bounds->min[k], g->positions[i][k]);
-            bounds->max[k] = fmaxf(bounds->max[k], g->positions[i][k]);
+            bounds->min[k] = fmin(bounds->min[k], g->positions[i][k]);
+            bounds->max[k] = fmax(bounds->max[k], g->positions[i][k]);
         }
     for (int k = 0; k < 3; k++)
         bounds->min[k] += g->base[k], bounds->max[k] += g->base[k];

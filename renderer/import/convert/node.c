@@ -100,19 +100,31 @@ static bool check_forest(struct imp_context *context, struct roots *roots, struc
     return done;
 }
 
-static void grow_bounds(
-    struct imp_context *context, const struct primitive_bounds *box, const double world[12])
+static void grow_box(const double from_min[3], const double from_max[3], const double world[12],
+    double min[3], double max[3])
 {
     for (int corner = 0; corner < 8; corner++) {
         double p[3], q[3];
         for (int k = 0; k < 3; k++)
-            p[k] = corner >> k & 1 ? box->max[k] : box->min[k];
+            p[k] = corner >> k & 1 ? from_max[k] : from_min[k];
         psc_affine_point(world, p, q);
         for (int k = 0; k < 3; k++) {
-            context->bounds_min[k] = fmin(context->bounds_min[k], q[k]);
-            context->bounds_max[k] = fmax(context->bounds_max[k], q[k]);
+            min[k] = fmin(min[k], q[k]);
+            max[k] = fmax(max[k], q[k]);
         }
     }
+}
+
+static uint32_t place_deforming(
+    struct imp_context *context, const struct imp_deformed_primitive *added, const double world[12])
+{
+    static const double identity[12] = {1, [5] = 1, [10] = 1};
+    double min[3] = {INFINITY, INFINITY, INFINITY}, max[3] = {-INFINITY, -INFINITY, -INFINITY};
+    if (added->skinned)
+        return psc_builder_place_deforming(
+            context->builder, added->psc, identity, added->min, added->max);
+    grow_box(added->min, added->max, world, min, max);
+    return psc_builder_place_deforming(context->builder, added->psc, world, min, max);
 }
 
 /* A primitive whose vertices move. */
@@ -126,11 +138,9 @@ static bool add_deforming_at(struct imp_context *context, uint32_t number, uint3
     *instance = IMP_SKIPPED;
     if (added.psc == IMP_SKIPPED)
         return true;
-    if (!added.skinned) {
-        *instance = psc_builder_place_instance(context->builder, added.psc, world);
+    *instance = place_deforming(context, &added, world);
+    if (!added.skinned)
         return true;
-    }
-    *instance = psc_builder_place_skinned(context->builder, added.psc, added.min, added.max);
     imp_deforming_instance(context->motion, *instance);
     for (int k = 0; !hidden && k < 3; k++) {
         context->bounds_min[k] = fmin(context->bounds_min[k], added.min[k]);
@@ -146,7 +156,8 @@ static bool add_primitive_at(struct imp_context *context, uint32_t number, uint3
 {
     uint32_t psc, instance = IMP_SKIPPED;
     bool skinned = false;
-    if (imp_deforms(context, &context->model->nodes[number], primitive)) {
+    bool deforms = imp_deforms(context, &context->model->nodes[number], primitive);
+    if (deforms) {
         if (!add_deforming_at(
                 context, number, primitive, world, hidden, &skinned, &instance, error))
             return false;
@@ -158,11 +169,12 @@ static bool add_primitive_at(struct imp_context *context, uint32_t number, uint3
     }
     if (instance == IMP_SKIPPED)
         return true;
+    const struct primitive_bounds *box = &context->primitive_bounds[primitive];
     if (hidden)
         psc_builder_hide_instance(context->builder, instance);
     else if (!skinned)
-        grow_bounds(context, &context->primitive_bounds[primitive], world);
-    imp_motion_ride_instance(context->motion, number, instance, local, skinned);
+        grow_box(box->min, box->max, world, context->bounds_min, context->bounds_max);
+    imp_motion_ride_instance(context->motion, number, instance, local, deforms, skinned);
     return true;
 }
 

@@ -301,7 +301,6 @@ static void find_bounds(struct imp_context *context, const struct deforming *d,
     const struct imp_slots *slots, uint32_t number, struct imp_deformed_primitive *added)
 {
     const struct imp_geometry *g = &d->geometry;
-    struct primitive_bounds *box = &context->primitive_bounds[number];
     double *min = added->min, *max = added->max;
     double(*points)[3] = pen_alloc(g->vertex_count, sizeof *points);
     for (int k = 0; k < 3; k++)
@@ -327,10 +326,8 @@ static void find_bounds(struct imp_context *context, const struct deforming *d,
         grow(min, max, d->skin >= 0 ? p : points[i]);
     }
     free(points);
-    for (int k = 0; k < 3; k++) {
-        box->min[k] = (float)min[k];
-        box->max[k] = (float)max[k];
-    }
+    memcpy(context->primitive_bounds[number].min, min, sizeof added->min);
+    memcpy(context->primitive_bounds[number].max, max, sizeof added->max);
 }
 
 static bool add(struct imp_context *context, struct deforming *d, uint32_t node, uint32_t number,
@@ -375,7 +372,10 @@ bool imp_add_deforming(struct imp_context *context, uint32_t node, uint32_t numb
     int64_t owner = own ? (int64_t)node : -1;
     *added = (struct imp_deformed_primitive){.psc = IMP_SKIPPED, .skinned = d.skin >= 0};
     if (!added->skinned && known->owner == owner) {
+        const struct primitive_bounds *box = &context->primitive_bounds[number];
         added->psc = known->psc;
+        memcpy(added->min, box->min, sizeof added->min);
+        memcpy(added->max, box->max, sizeof added->max);
         return true;
     }
     bool done = imp_geometry_read(context, number, &d.geometry, error);

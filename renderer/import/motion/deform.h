@@ -7,9 +7,9 @@ bool imp_deforms(
     const struct imp_context *context, const struct gltf_node *node, uint32_t primitive);
 
 struct imp_deformed_primitive {
-    uint32_t psc; /* IMP_SKIPPED: there is nothing to draw */
-    bool skinned; /* the joints place it, within these bounds of the file's world at rest */
-    double min[3], max[3];
+    uint32_t psc;          /* IMP_SKIPPED: there is nothing to draw */
+    bool skinned;          /* the joints place it */
+    double min[3], max[3]; /* at rest, in the file's world when joints place it, else the node's */
 };
 /* Adds it. Errors: PEN_INVALID, PEN_TOO_BIG. */
 bool imp_add_deforming(struct imp_context *context, uint32_t node, uint32_t primitive,

@@ -127,16 +127,16 @@ void imp_motion_free(struct imp_motion *motion)
 
 static void add_rider(struct imp_motion *motion, const struct psc_rider *rider)
 {
-    if (!motion->moves[rider->node])
-        return;
     motion->riders =
         pen_grow(motion->riders, &motion->rider_room, motion->rider_count + 1, sizeof *rider);
     motion->riders[motion->rider_count++] = *rider;
 }
 
-void imp_motion_ride_instance(
-    struct imp_motion *motion, uint32_t node, uint32_t item, const double local[12], bool skinned)
+void imp_motion_ride_instance(struct imp_motion *motion, uint32_t node, uint32_t item,
+    const double local[12], bool deforms, bool skinned)
 {
+    if (!motion->moves[node] && (!deforms || skinned))
+        return;
     struct psc_rider rider = {.kind = PSC_RIDER_INSTANCE,
         .item = item,
         .node = node,
@@ -150,6 +150,8 @@ void imp_motion_ride_instance(
 void imp_motion_ride(struct imp_motion *motion, uint32_t node, enum psc_rider_kind kind,
     uint32_t item, const float size[2])
 {
+    if (!motion->moves[node])
+        return;
     struct psc_rider rider = {.kind = kind,
         .item = item,
         .node = node,

@@ -48,9 +48,10 @@ bool imp_motion_open(struct imp_context *context, const uint32_t *roots, uint32_
     struct pen_error *error);
 void imp_motion_free(struct imp_motion *motion); /* NULL is fine */
 
-/* Notes that a node carries an item, when that node moves. */
+/* Notes that a node carries an item, when that node moves or it depends on the pose where the item's
+ * vertices are. */
 void imp_motion_ride_instance(struct imp_motion *motion, uint32_t node, uint32_t item,
-    const double local[12], bool skinned); /* row-major; NULL: the node's own place */
+    const double local[12], bool deforms, bool skinned); /* row-major; NULL: the node's own place */
 void imp_motion_ride(struct imp_motion *motion, uint32_t node, enum psc_rider_kind kind,
     uint32_t item, const float size[2]);
 void imp_motion_use_light(struct imp_motion *motion, struct imp_use item);

@@ -12,7 +12,8 @@ struct setup {
     struct pen_light lights[PEN_MAX_LIGHTS];
     uint32_t light_count, width, height, casters, ground;
     int32_t variant;
-    float time_s; /* of emission that changes with time */
+    float time_s;     /* of emission that changes with time */
+    double origin[3]; /* that places are relative to */
 };
 
 struct history {
@@ -258,6 +259,7 @@ static void fill_setup(const struct technique_run *run, struct setup *s)
     s->casters = r->casters;
     s->ground = r->ground.on != 0;
     s->variant = run->scene->pose.variant;
+    memcpy(s->origin, run->scene->blob.header->origin, sizeof s->origin);
     for (uint32_t i = 0; i < r->light_count; i++)
         if (r->lights[i].texture != PEN_TEXTURE_NONE)
             s->time_s = r->time_s;

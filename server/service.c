@@ -281,7 +281,8 @@ struct service *service_create(
     hash_add(hash, s->openapi, strlen(s->openapi));
     hash_finish(hash, digest);
     pen_id_to_hex(digest, s->openapi_tag);
-    if (!make_canary(s, error) || !(s->store = scene_store_open(config->store, error)))
+    if (!make_canary(s, error) ||
+        !(s->store = scene_store_open(config->store, config->store_limit.bytes, error)))
         goto fail;
     struct scheduler_limits limits = {.queue = (uint32_t)config->queue_limit,
         .client_share = (uint32_t)config->client_share,

@@ -19,6 +19,7 @@ struct options {
     enum pen_import_mode mode;
     uint8_t source[PEN_ID_BYTES];
     uint32_t memory_mb, cpu_seconds;
+    uint64_t output_bytes; /* at most OUTPUT_BYTES */
 };
 
 /* What the handlers below send: filled before any untrusted byte is read. */
@@ -59,11 +60,21 @@ static bool parse_number(const char *text, uint32_t most, uint32_t *number)
     return text[0] >= '0' && text[0] <= '9' && !*end && n >= 1 && n <= most;
 }
 
+/* Any number is right: beyond OUTPUT_BYTES it is no limit of its own. */
+static bool parse_bytes(const char *text, uint64_t *bytes)
+{
+    char *end;
+    unsigned long long n = strtoull(text, &end, 10);
+    *bytes = n < OUTPUT_BYTES ? n : OUTPUT_BYTES;
+    return text[0] >= '0' && text[0] <= '9' && !*end;
+}
+
 static bool parse_options(int argc, char **argv, struct options *options)
 {
     static const struct option names[] = {{"mode", required_argument, NULL, 'm'},
         {"source-id", required_argument, NULL, 'i'}, {"memory-mb", required_argument, NULL, 'M'},
-        {"cpu-seconds", required_argument, NULL, 'c'}, {NULL, 0, NULL, 0}};
+        {"cpu-seconds", required_argument, NULL, 'c'},
+        {"output-bytes", required_argument, NULL, 'o'}, {NULL, 0, NULL, 0}};
     bool have_mode = false, have_source = false;
     for (int c; (c = getopt_long(argc, argv, "", names, NULL)) != -1;) {
         if (c == 'm' && (!strcmp(optarg, "scene") || !strcmp(optarg, "image"))) {
@@ -72,11 +83,22 @@ static bool parse_options(int argc, char **argv, struct options *options)
         } else if (c == 'i' && pen_id_from_hex(optarg, options->source)) {
             have_source = true;
         } else if (!(c == 'M' && parse_number(optarg, 1 << 20, &options->memory_mb)) &&
+                   !(c == 'o' && parse_bytes(optarg, &options->output_bytes)) &&
                    !(c == 'c' && parse_number(optarg, 86400, &options->cpu_seconds))) {
             return false;
         }
     }
     return have_mode && have_source && optind == argc;
+}
+
+static bool fits(const struct options *options, size_t bytes, struct pen_error *error)
+{
+    return bytes <= options->output_bytes ||
+           pen_fail(error, PEN_FULL, "",
+               "Imported, the upload takes %.1f MiB; the store has room for %.1f MiB. Delete what "
+               "is no "
+               "longer used, or have --store-limit raised.",
+               (double)bytes / (1 << 20), (double)options->output_bytes / (1 << 20));
 }
 
 static bool write_output(const uint8_t *blob, size_t bytes, struct pen_error *error)
@@ -86,7 +108,8 @@ static bool write_output(const uint8_t *blob, size_t bytes, struct pen_error *er
         if (n < 0 && errno == EINTR)
             continue;
         if (n <= 0)
-            return pen_fail(error, PEN_INTERNAL, "", "The imported scene could not be stored.");
+            return pen_fail(error, errno == ENOSPC || errno == EDQUOT ? PEN_FULL : PEN_INTERNAL, "",
+                "The imported scene could not be stored: %s.", strerror(errno));
         blob += n;
         bytes -= (size_t)n;
     }
@@ -96,7 +119,7 @@ static bool write_output(const uint8_t *blob, size_t bytes, struct pen_error *er
 static bool run(const struct options *options, struct pen_error *error)
 {
     const struct pen_sandbox_limits limits = {.memory_bytes = (uint64_t)options->memory_mb << 20,
-        .output_bytes = OUTPUT_BYTES,
+        .output_bytes = options->output_bytes,
         .cpu_seconds = options->cpu_seconds};
     struct stat source;
     if (fstat(PEN_IMPORT_SOURCE_FD, &source))
@@ -114,15 +137,15 @@ static bool run(const struct options *options, struct pen_error *error)
     size_t blob_bytes;
     return pen_sandbox_enter(&limits, error) &&
            pen_import(data, bytes, options->mode, options->source, &blob, &blob_bytes, error) &&
-           write_output(blob, blob_bytes, error);
+           fits(options, blob_bytes, error) && write_output(blob, blob_bytes, error);
 }
 
 int main(int argc, char **argv)
 {
-    struct options options = {.memory_mb = 2048, .cpu_seconds = 60};
+    struct options options = {.memory_mb = 2048, .cpu_seconds = 60, .output_bytes = OUTPUT_BYTES};
     if (!parse_options(argc, argv, &options)) {
         fprintf(stderr, "usage: penumbra-import --mode scene|image --source-id <64 hex digits> "
-                        "[--memory-mb 2048] [--cpu-seconds 60]\n"
+                        "[--memory-mb 2048] [--cpu-seconds 60] [--output-bytes 4294967296]\n"
                         "Run by penumbrad with the upload on descriptor 3.\n");
         return 2;
     }

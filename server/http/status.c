@@ -18,6 +18,7 @@ struct http_status http_status_of(enum pen_code code)
         ROW(LOST, 500, "Internal Server Error", true);
         ROW(UNAVAILABLE, 503, "Service Unavailable", true);
         ROW(DEADLINE, 504, "Gateway Timeout", true);
+        ROW(FULL, 507, "Insufficient Storage", false);
         ROW(UNAUTHORIZED, 401, "Unauthorized", false);
         ROW(FORBIDDEN, 403, "Forbidden", false);
         ROW(MISDIRECTED, 421, "Misdirected Request", false);

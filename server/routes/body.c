@@ -87,6 +87,9 @@ static bool open_upload(struct call_body *body, struct service *s, enum pen_body
     if (is_longer(x, limit))
         return pen_fail(
             error, PEN_TOO_BIG, "", "An upload has at most %llu bytes.", (unsigned long long)limit);
+    if (x->content_length != HTTP_UNKNOWN_LENGTH &&
+        !store_quota_fits(scene_store_quota(s->store), x->content_length, error))
+        return false;
     if (!read_entry(x, takes, entry, error))
         return false;
     body->has_place = true;
@@ -104,7 +107,7 @@ bool body_open(struct call_body *body, struct service *service, enum pen_body ta
         return true;
     if (pen_upload_types(takes)) {
         bool ok = open_upload(body, service, takes, x, type, error);
-        if (!ok)
+        if (!ok && error->code != PEN_FULL) /* time does not mend that */
             error->retry_after_s = ROUTES_BUSY_S;
         return ok;
     }

@@ -70,6 +70,7 @@ static void write_limits(struct pen_json *json, const struct config *config)
     pen_json_uint(json, "lights", PEN_MAX_LIGHTS);
     pen_json_uint(json, "json_bytes", PEN_MAX_JSON_BYTES);
     pen_json_uint(json, "upload_bytes", config->upload_limit.bytes);
+    pen_json_uint(json, "store_bytes", config->store_limit.bytes);
     pen_json_uint(json, "queued_renders", config->queue_limit);
     pen_json_uint(json, "renders_per_client", config->client_share);
     pen_json_uint(json, "gpu_memory_bytes", config->gpu_memory.bytes);

@@ -257,9 +257,7 @@ void scene_store_lose(
 {
     char hex[PEN_ID_HEX + 1];
     pen_id_to_hex(id, hex);
-    pthread_mutex_lock(&store->lock);
-    store_index_remove(&store->lists[kind], id);
-    pthread_mutex_unlock(&store->lock);
+    scene_store_leave(store, kind, id);
     scene_store_put_aside(store, kind, hex);
 }
 

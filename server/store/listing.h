@@ -21,6 +21,13 @@ struct store_entry {
     struct sums_mark blob_mark, meta_mark;
 };
 
+/* What an entry takes of the store's limit; some files beside source and blob are small. */
+#define STORE_ENTRY_BYTES 8192
+static inline uint64_t store_entry_size(const struct store_entry *entry)
+{
+    return entry->source_bytes + entry->blob_bytes + STORE_ENTRY_BYTES;
+}
+
 struct scene_store;
 bool scene_store_find(struct scene_store *store, enum store_kind kind,
     const uint8_t id[PEN_ID_BYTES], struct store_entry *entry);

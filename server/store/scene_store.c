@@ -24,7 +24,7 @@ static void scan(struct scene_store *store, enum store_kind kind)
         if (*item->d_name == '.')
             continue;
         if (scene_store_inspect(store, kind, item->d_name, &entry))
-            store_index_insert(&store->lists[kind], &entry);
+            scene_store_enter(store, kind, &entry, 0);
         else if (pen_id_from_hex(item->d_name, entry.id))
             scene_store_put_aside(store, kind, item->d_name);
         else
@@ -84,10 +84,11 @@ static bool open_all(struct scene_store *store, const char *path, struct pen_err
     return ok;
 }
 
-struct scene_store *scene_store_open(const char *path, struct pen_error *error)
+struct scene_store *scene_store_open(const char *path, uint64_t limit, struct pen_error *error)
 {
     struct scene_store *store = pen_alloc_zero(1, sizeof *store);
     pthread_mutex_init(&store->lock, NULL);
+    store->quota = store_quota_create(limit);
     store->tmp = store->damaged = store->lock_file = -1;
     store->kinds[STORE_SCENES] = store->kinds[STORE_IMAGES] = -1;
     if (!open_all(store, path, error)) {
@@ -111,6 +112,7 @@ void scene_store_close(struct scene_store *store)
             close(fds[i]);
     for (int k = 0; k < STORE_KINDS; k++)
         free(store->lists[k].entries);
+    store_quota_destroy(store->quota);
     pthread_mutex_destroy(&store->lock);
     free(store);
 }
@@ -127,9 +129,7 @@ bool scene_store_remove(struct scene_store *store, enum store_kind kind,
                 error, PEN_NOT_FOUND, "", "There is no such %s.", scene_store_word(kind));
         return pen_fail(error, PEN_UNAVAILABLE, "", "The store could not be written.");
     }
-    pthread_mutex_lock(&store->lock);
-    store_index_remove(&store->lists[kind], id);
-    pthread_mutex_unlock(&store->lock);
+    scene_store_leave(store, kind, id);
     fsync(store->kinds[kind]);
     file_remove_all(store->tmp, name);
     return true;
@@ -139,10 +139,9 @@ bool scene_store_stage(
     struct scene_store *store, struct store_staging *staging, struct pen_error *error)
 {
     scene_store_new_name(store, staging->name);
+    staging->claimed = 0;
     staging->folder = open_folder(store->tmp, staging->name);
-    if (staging->folder < 0)
-        return pen_fail(error, PEN_UNAVAILABLE, "", "The store could not be written.");
-    return true;
+    return staging->folder >= 0 || store_write_failed(errno, error);
 }
 
 void scene_store_discard(struct scene_store *store, struct store_staging *staging)
@@ -152,6 +151,27 @@ void scene_store_discard(struct scene_store *store, struct store_staging *stagin
     close(staging->folder);
     staging->folder = -1;
     file_remove_all(store->tmp, staging->name);
+    store_quota_settle(store->quota, staging->claimed, 0);
+    staging->claimed = 0;
+}
+
+void scene_store_give_back(struct scene_store *store, struct store_staging *staging, uint64_t bytes)
+{
+    store_quota_settle(store->quota, bytes, 0);
+    staging->claimed -= bytes;
+}
+
+bool scene_store_claim(struct scene_store *store, struct store_staging *staging, uint64_t bytes,
+    struct pen_error *error)
+{
+    bool ok = store_quota_claim(store->quota, bytes, error);
+    staging->claimed += ok ? bytes : 0;
+    return ok;
+}
+
+struct store_quota *scene_store_quota(struct scene_store *store)
+{
+    return store->quota;
 }
 
 static bool sync_file(int folder, const char *name)
@@ -197,18 +217,19 @@ bool scene_store_commit(struct scene_store *store, enum store_kind kind,
               sync_file(staging->folder, scene_store_blob_name(kind)) &&
               sync_file(staging->folder, STORE_META) && sums_write(staging->folder, summed, 2) &&
               !fsync(staging->folder) && take_name(store, kind, staging, hex, id, added);
+    int failed = errno;
     if (!*added) {
         scene_store_discard(store, staging);
-        return ok || pen_fail(error, PEN_UNAVAILABLE, "", "The store could not be written.");
+        return ok || store_write_failed(failed, error);
     }
     close(staging->folder);
     staging->folder = -1;
     fsync(store->kinds[kind]);
-    if (scene_store_inspect(store, kind, hex, &entry)) {
-        pthread_mutex_lock(&store->lock);
-        store_index_insert(&store->lists[kind], &entry);
-        pthread_mutex_unlock(&store->lock);
-    }
+    if (scene_store_inspect(store, kind, hex, &entry))
+        scene_store_enter(store, kind, &entry, staging->claimed);
+    else
+        store_quota_settle(store->quota, staging->claimed, 0);
+    staging->claimed = 0;
     return true;
 }
 
@@ -226,15 +247,12 @@ bool scene_store_refresh(struct scene_store *store, enum store_kind kind,
                   scene_store_blob_name(kind)) &&
               file_replace(staging->folder, STORE_META, folder, STORE_META) &&
               file_replace(staging->folder, STORE_SUMS, folder, STORE_SUMS) && !fsync(folder);
+    int failed = errno;
     if (folder >= 0)
         close(folder);
     scene_store_discard(store, staging);
     if (!ok || !scene_store_inspect(store, kind, hex, &entry))
-        return pen_fail(error, PEN_UNAVAILABLE, "", "The store could not be written.");
-    pthread_mutex_lock(&store->lock);
-    struct store_entry *found = store_index_find(&store->lists[kind], id);
-    if (found) /* unless it was deleted meanwhile */
-        *found = entry;
-    pthread_mutex_unlock(&store->lock);
+        return store_write_failed(failed, error);
+    scene_store_renew(store, kind, &entry);
     return true;
 }

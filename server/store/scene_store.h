@@ -6,17 +6,21 @@
 #pragma once
 #include "protocol/error.h"
 #include "server/store/listing.h"
+#include "server/store/quota.h"
 
 /* A folder under tmp/ that is being filled. */
 struct store_staging {
     char name[32];
-    int folder; /* O_DIRECTORY; -1: none */
+    int folder;       /* O_DIRECTORY; -1: none */
+    uint64_t claimed; /* bytes of the quota */
 };
 
-/* Creates what is missing, removes what a crash left under tmp/, and lists what is there. Errors:
+/* Creates what is missing, removes what a crash left under tmp/, and lists what is there. `limit`: of the
+ * quota; what is more than that already stays. Errors:
  * PEN_UNAVAILABLE (no such folder, no permission, another daemon uses it). */
-struct scene_store *scene_store_open(const char *path, struct pen_error *error);
+struct scene_store *scene_store_open(const char *path, uint64_t limit, struct pen_error *error);
 void scene_store_close(struct scene_store *store);
+struct store_quota *scene_store_quota(struct scene_store *store);
 
 /* Calls `import` for each entry that is stale, now and whenever one is found to be, from any thread
  * and without a lock; to be answered by scene_store_refresh or scene_store_not_refreshed. */
@@ -41,12 +45,18 @@ int scene_store_open_folder(struct scene_store *store, enum store_kind kind,
 bool scene_store_remove(struct scene_store *store, enum store_kind kind,
     const uint8_t id[PEN_ID_BYTES], struct pen_error *error);
 
-/* Files in a staging folder are opened relative to staging->folder. */
+/* Files in a staging folder are opened relative to staging->folder, and claimed before they are written. */
 bool scene_store_stage(
     struct scene_store *store, struct store_staging *staging, struct pen_error *error);
+/* As store_quota_claim; given back when the folder is discarded, or by the size of the entry. */
+bool scene_store_claim(struct scene_store *store, struct store_staging *staging, uint64_t bytes,
+    struct pen_error *error);
+/* Of what was claimed for files that are gone again. */
+void scene_store_give_back(
+    struct scene_store *store, struct store_staging *staging, uint64_t bytes);
 /* Adds up and syncs the files and gives the folder its name. *added is false when the id is there
  * already, and sound; what is not is replaced. The staging folder is gone either way, also on
- * failure. Errors: PEN_UNAVAILABLE. */
+ * failure. Errors: PEN_UNAVAILABLE, PEN_FULL. */
 bool scene_store_commit(struct scene_store *store, enum store_kind kind,
     struct store_staging *staging, const uint8_t id[PEN_ID_BYTES], bool *added,
     struct pen_error *error);

@@ -105,6 +105,39 @@ bool scene_store_inspect(
     return has_source || !entry->stale;
 }
 
+void scene_store_enter(struct scene_store *store, enum store_kind kind,
+    const struct store_entry *entry, uint64_t claimed)
+{
+    pthread_mutex_lock(&store->lock);
+    const struct store_entry *before = store_index_find(&store->lists[kind], entry->id);
+    store_quota_settle(
+        store->quota, claimed + (before ? store_entry_size(before) : 0), store_entry_size(entry));
+    store_index_insert(&store->lists[kind], entry);
+    pthread_mutex_unlock(&store->lock);
+}
+
+void scene_store_renew(
+    struct scene_store *store, enum store_kind kind, const struct store_entry *entry)
+{
+    pthread_mutex_lock(&store->lock);
+    struct store_entry *found = store_index_find(&store->lists[kind], entry->id);
+    if (found) {
+        store_quota_settle(store->quota, store_entry_size(found), store_entry_size(entry));
+        *found = *entry;
+    }
+    pthread_mutex_unlock(&store->lock);
+}
+
+void scene_store_leave(
+    struct scene_store *store, enum store_kind kind, const uint8_t id[PEN_ID_BYTES])
+{
+    pthread_mutex_lock(&store->lock);
+    const struct store_entry *entry = store_index_find(&store->lists[kind], id);
+    store_quota_settle(store->quota, entry ? store_entry_size(entry) : 0, 0);
+    store_index_remove(&store->lists[kind], id);
+    pthread_mutex_unlock(&store->lock);
+}
+
 void scene_store_put_aside(struct scene_store *store, enum store_kind kind, const char *name)
 {
     char to[96];

@@ -74,15 +74,17 @@ static bool judge(struct importer *importer, int status, const struct pen_error 
 static bool run_process(struct importer *importer, const struct import_task *task, int source_fd,
     int blob_fd, struct pen_error *error)
 {
+    uint64_t room = store_quota_left(scene_store_quota(importer->config.store));
     const struct importer_config *config = &importer->config;
-    char id[PEN_ID_HEX + 1], memory[24], cpu[24];
+    char id[PEN_ID_HEX + 1], memory[24], cpu[24], output[24];
     int report_pipe[2];
     pen_id_to_hex(task->id, id);
     snprintf(memory, sizeof memory, "%llu", (unsigned long long)config->memory_bytes >> 20);
     snprintf(cpu, sizeof cpu, "%llu", (unsigned long long)config->cpu_seconds);
     char *arguments[] = {"penumbra-import", "--mode",
         task->kind == STORE_SCENES ? "scene" : "image", "--source-id", id, "--memory-mb", memory,
-        "--cpu-seconds", cpu, NULL};
+        "--cpu-seconds", cpu, "--output-bytes", output, NULL};
+    snprintf(output, sizeof output, "%llu", (unsigned long long)room);
     if (pipe2(report_pipe, O_CLOEXEC | O_NONBLOCK))
         return pen_fail(error, PEN_UNAVAILABLE, "", "The service is out of descriptors.");
     struct process_fd fds[] = {{source_fd, PEN_IMPORT_SOURCE_FD}, {blob_fd, PEN_IMPORT_OUTPUT_FD},
@@ -124,23 +126,27 @@ static bool write_meta(int folder, const char *text)
 
 /* Source to blob and description, in the staging folder. */
 static bool import(struct importer *importer, struct import_task *task,
-    const struct store_staging *staging, int source_fd)
+    struct store_staging *staging, int source_fd)
 {
     struct pen_error *error = &task->error;
     char *meta = NULL;
-    struct stat status;
+    struct stat status, blob;
     int blob_fd = openat(staging->folder, scene_store_blob_name(task->kind),
         O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
     bool ok = source_fd >= 0 && blob_fd >= 0 && !fstat(source_fd, &status);
     if (!ok)
-        pen_fail(error, PEN_UNAVAILABLE, "", "The store could not be written.");
+        store_write_failed(errno, error);
     ok = ok && run_process(importer, task, source_fd, blob_fd, error);
+    if (ok && fstat(blob_fd, &blob))
+        ok = store_write_failed(errno, error);
+    ok = ok && scene_store_claim(importer->config.store, staging,
+                   (uint64_t)blob.st_size + STORE_ENTRY_BYTES, error);
     if (ok)
         meta = describe_blob(
             task->kind, task->id, blob_fd, (uint64_t)status.st_size, time(NULL), error);
     ok = ok && meta;
     if (ok && !write_meta(staging->folder, meta))
-        ok = pen_fail(error, PEN_UNAVAILABLE, "", "The store could not be written.");
+        ok = store_write_failed(errno, error);
     free(meta);
     if (blob_fd >= 0)
         close(blob_fd);

@@ -31,17 +31,18 @@ struct upload {
     size_t part_capacity;
 };
 
-static bool write_all(int fd, const void *data, size_t bytes, struct pen_error *error)
+static bool write_all(
+    struct upload *u, int fd, const void *data, size_t bytes, struct pen_error *error)
 {
     const char *at = data;
+    if (!scene_store_claim(u->store, &u->staging, bytes, error))
+        return false;
     while (bytes) {
         ssize_t n = write(fd, at, bytes);
         if (n < 0 && errno == EINTR)
             continue;
         if (n <= 0)
-            return pen_fail(error, PEN_UNAVAILABLE, "",
-                errno == ENOSPC || errno == EDQUOT ? "The store is full."
-                                                   : "The store could not be written.");
+            return store_write_failed(errno, error);
         at += n;
         bytes -= (size_t)n;
     }
@@ -70,13 +71,13 @@ static bool add_data(void *context, const void *data, size_t bytes, struct pen_e
     struct upload *u = context;
     u->parts[u->part_count - 1].bytes += bytes;
     u->written += bytes;
-    return write_all(u->file, data, bytes, error);
+    return write_all(u, u->file, data, bytes, error);
 }
 
 static bool put(struct upload *u, int to, const void *data, size_t bytes, struct pen_error *error)
 {
     hash_add(u->hash, data, bytes);
-    return write_all(to, data, bytes, error);
+    return write_all(u, to, data, bytes, error);
 }
 
 /* What bundle.h has before an upload of which one scene was chosen. */
@@ -107,7 +108,7 @@ struct upload *upload_create(struct scene_store *store, const char *content_type
     u->file = openat(u->staging.folder, is_multipart ? SPOOL : STORE_SOURCE,
         O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
     if (u->file < 0) {
-        pen_fail(error, PEN_UNAVAILABLE, "", "The store could not be written.");
+        store_write_failed(errno, error);
         goto fail;
     }
     if (!is_multipart && !put_entry(u, u->file, error))
@@ -140,7 +141,7 @@ bool upload_add(struct upload *u, const void *data, size_t bytes, struct pen_err
     if (u->multipart)
         return multipart_add(u->multipart, data, bytes, error);
     hash_add(u->hash, data, bytes);
-    return write_all(u->file, data, bytes, error);
+    return write_all(u, u->file, data, bytes, error);
 }
 
 static int by_name(const void *a, const void *b)
@@ -183,7 +184,7 @@ static bool write_bundle(struct upload *u, struct pen_error *error)
             return pen_fail(error, PEN_INVALID, "", "Two files of the upload have the same name.");
     int to = openat(u->staging.folder, STORE_SOURCE, O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
     if (to < 0)
-        return pen_fail(error, PEN_UNAVAILABLE, "", "The store could not be written.");
+        return store_write_failed(errno, error);
     u->hash = hash_create();
     bool alone = u->part_count == 1 && stands_alone(u->parts[0].name);
     uint32_t head[2] = {u->part_count, 0};
@@ -202,6 +203,7 @@ static bool write_bundle(struct upload *u, struct pen_error *error)
     close(u->file);
     u->file = to;
     unlinkat(u->staging.folder, SPOOL, 0);
+    scene_store_give_back(u->store, &u->staging, u->written);
     return ok;
 }
 

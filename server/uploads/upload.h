@@ -12,7 +12,7 @@ struct upload *upload_create(struct scene_store *store, const char *content_type
     uint64_t limit, struct pen_error *error);
 /* Removes what is left of it. */
 void upload_destroy(struct upload *upload);
-/* Errors: PEN_TOO_BIG, PEN_MALFORMED, PEN_UNAVAILABLE when the disk is full. */
+/* Errors: PEN_TOO_BIG, PEN_MALFORMED, PEN_FULL, PEN_UNAVAILABLE. */
 bool upload_add(struct upload *upload, const void *data, size_t bytes, struct pen_error *error);
 /* The body is over: writes the source file and gives its id. May take a while. */
 bool upload_finish(struct upload *upload, uint8_t id[PEN_ID_BYTES], struct pen_error *error);

@@ -237,7 +237,7 @@ static void check_store(const char *folder)
 {
     struct pen_error error = {0};
     struct store_staging staging;
-    struct scene_store *store = scene_store_open(folder, &error);
+    struct scene_store *store = scene_store_open(folder, 0, &error);
     CHECK(store != NULL);
     if (!store)
         return;

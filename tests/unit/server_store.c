@@ -1,6 +1,7 @@
 /* The store: complete or not there, across openings, damage and leftovers. */
 #include "protocol/request.h"
 #include "renderer/blob/builder.h"
+#include "server/base/file.h"
 #include "server/base/hash.h"
 #include "server/store/scene_store.h"
 #include "server/uploads/upload.h"
@@ -77,13 +78,13 @@ static int count_files(const char *folder)
 
 static void test_life(void)
 {
-    struct scene_store *store = scene_store_open(root, NULL);
+    struct scene_store *store = scene_store_open(root, 0, NULL);
     struct pen_error error = {0};
     struct store_staging staging;
     struct store_entry entry;
     bool added;
     CHECK(store != NULL);
-    CHECK(!scene_store_open(root, &error) && error.code == PEN_UNAVAILABLE); /* one at a time */
+    CHECK(!scene_store_open(root, 0, &error) && error.code == PEN_UNAVAILABLE); /* one at a time */
     for (int i = 4; i >= 0; i--) {
         CHECK(scene_store_stage(store, &staging, NULL));
         fill(&staging, i);
@@ -143,7 +144,7 @@ static void test_reopening(void)
     CHECK(unlink(path) == 0);
     snprintf(path, sizeof path, "%s/scenes/not-a-scene", root);
     CHECK(mkdir(path, 0700) == 0);
-    struct scene_store *store = scene_store_open(root, NULL);
+    struct scene_store *store = scene_store_open(root, 0, NULL);
     struct store_entry entry;
     struct pen_error error = {0};
     CHECK(store && count_files("tmp") == 0);
@@ -176,7 +177,7 @@ static void test_uploads(void)
     static const uint8_t abc[PEN_ID_BYTES] = {0xba, 0x78, 0x16, 0xbf, 0x8f, 0x01, 0xcf, 0xea, 0x41,
         0x41, 0x40, 0xde, 0x5d, 0xae, 0x22, 0x23, 0xb0, 0x03, 0x61, 0xa3, 0x96, 0x17, 0x7a, 0x9c,
         0xb4, 0x10, 0xff, 0x61, 0xf2, 0x00, 0x15, 0xad}; /* FIPS 180-2, appendix B.1 */
-    struct scene_store *store = scene_store_open(root, NULL);
+    struct scene_store *store = scene_store_open(root, 0, NULL);
     uint8_t id[PEN_ID_BYTES];
     struct upload *upload = upload_create(store, "model/gltf-binary", "", 3, NULL);
     CHECK(upload_add(upload, "a", 1, NULL) && upload_add(upload, "bc", 2, NULL));
@@ -191,6 +192,82 @@ static void test_uploads(void)
     upload_destroy(upload);
     CHECK(count_files("tmp") == 0);
     scene_store_close(store);
+}
+
+static uint64_t asked;
+
+static void reclaim_hundred(void *context, uint64_t bytes)
+{
+    struct store_quota *quota = context;
+    asked = bytes;
+    store_quota_settle(quota, 100, 0);
+    store_quota_spare(quota, 100, 0);
+}
+
+static void test_quota(void)
+{
+    struct store_quota *quota = store_quota_create(1000);
+    struct pen_error error = {0};
+    CHECK(store_quota_claim(quota, 600, NULL) && store_quota_left(quota) == 400);
+    CHECK(!store_quota_claim(quota, 401, &error) && error.code == PEN_FULL);
+    CHECK(store_quota_claim(quota, 400, NULL) && store_quota_left(quota) == 0);
+    CHECK(store_quota_claim(quota, 0, NULL));
+    store_quota_spare(quota, 0, 100);
+    CHECK(store_quota_left(quota) == 100 && store_quota_used(quota) == 1000);
+    CHECK(!store_quota_claim(quota, 30, NULL)); /* nobody frees it */
+    store_quota_on_need(quota, reclaim_hundred, quota);
+    CHECK(store_quota_claim(quota, 30, NULL) && asked == 30);
+    CHECK(store_quota_used(quota) == 930 && store_quota_left(quota) == 70);
+    store_quota_settle(quota, 900, 5000); /* more was found there than is allowed */
+    CHECK(store_quota_left(quota) == 0 && !store_quota_fits(quota, 1, NULL));
+    CHECK(!store_quota_claim(quota, UINT64_MAX, NULL));
+    store_quota_destroy(quota);
+    quota = store_quota_create(0);
+    CHECK(store_quota_left(quota) == UINT64_MAX && store_quota_claim(quota, 1ull << 50, NULL));
+    store_quota_destroy(quota);
+}
+
+/* Every way in and out of the store leaves the sum as the entries have it. */
+static void test_limit(void)
+{
+    char folder[] = "/tmp/penumbra-limit-XXXXXX";
+    CHECK(mkdtemp(folder) != NULL);
+    struct scene_store *store = scene_store_open(folder, 3 * STORE_ENTRY_BYTES, NULL);
+    struct store_quota *quota = scene_store_quota(store);
+    struct store_staging staging;
+    struct store_entry entry;
+    struct pen_error error = {0};
+    bool added;
+    CHECK(store_quota_used(quota) == 0);
+    CHECK(scene_store_stage(store, &staging, NULL));
+    CHECK(scene_store_claim(store, &staging, 2 * STORE_ENTRY_BYTES, NULL));
+    CHECK(!scene_store_claim(store, &staging, 2 * STORE_ENTRY_BYTES, &error));
+    CHECK(error.code == PEN_FULL && store_quota_used(quota) == 2 * STORE_ENTRY_BYTES);
+    scene_store_give_back(store, &staging, 100);
+    CHECK(store_quota_used(quota) == 2 * STORE_ENTRY_BYTES - 100);
+    fill(&staging, 0);
+    CHECK(scene_store_commit(store, STORE_SCENES, &staging, ids[0], &added, NULL) && added);
+    CHECK(scene_store_find(store, STORE_SCENES, ids[0], &entry));
+    uint64_t one = store_entry_size(&entry);
+    CHECK(one > STORE_ENTRY_BYTES && store_quota_used(quota) == one);
+    CHECK(scene_store_stage(store, &staging, NULL) && scene_store_claim(store, &staging, 77, NULL));
+    fill(&staging, 0); /* the same again */
+    CHECK(scene_store_commit(store, STORE_SCENES, &staging, ids[0], &added, NULL) && !added);
+    CHECK(store_quota_used(quota) == one);
+    CHECK(scene_store_stage(store, &staging, NULL) && scene_store_claim(store, &staging, 77, NULL));
+    fill(&staging, 0);
+    CHECK(scene_store_refresh(store, STORE_SCENES, &staging, ids[0], NULL));
+    CHECK(store_quota_used(quota) == one);
+    CHECK(scene_store_stage(store, &staging, NULL) && scene_store_claim(store, &staging, 77, NULL));
+    scene_store_discard(store, &staging);
+    CHECK(store_quota_used(quota) == one);
+    scene_store_close(store);
+    store = scene_store_open(folder, 1, NULL); /* less than is there */
+    CHECK(store && store_quota_used(scene_store_quota(store)) == one);
+    CHECK(scene_store_remove(store, STORE_SCENES, ids[0], NULL));
+    CHECK(store_quota_used(scene_store_quota(store)) == 0);
+    scene_store_close(store);
+    file_remove_all(AT_FDCWD, folder);
 }
 
 /* The check values of CRC-64 of ECMA-182 as xz has it, from its specification. */
@@ -232,6 +309,8 @@ int main(void)
     test_life();
     test_reopening();
     test_uploads();
+    test_quota();
+    test_limit();
     char command[64];
     snprintf(command, sizeof command, "rm -rf %s", root);
     CHECK(system(command) == 0);

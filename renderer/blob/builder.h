@@ -21,7 +21,7 @@ struct psc_mesh_deform {
 struct psc_mesh {
     const float (*positions)[3];
     const float (*normals)[3];  /* NULL: flat normals are generated (vertices are split) */
-    const float (*tangents)[4]; /* NULL: generated from uv set 0 when `need_tangents` */
+    const float (*tangents)[4]; /* NULL: made for `normal_map` */
     const float (*uv0)[2];      /* NULL: zero */
     const float (*uv1)[2];      /* NULL: zero */
     const float (*colors)[4];   /* NULL: white */
@@ -29,7 +29,7 @@ struct psc_mesh {
     const uint32_t *indices; /* NULL: 0 .. vertex_count - 1 */
     uint32_t index_count;    /* a multiple of 3 */
     uint32_t material;
-    bool need_tangents;
+    const struct psc_texture_ref *normal_map; /* NULL: there is none to bend normals */
     /* When not NULL: triangles per meshlet, in order, each at most PSC_MESHLET_TRIANGLES (what an
      * optimiser found). NULL: consecutive runs. */
     const uint32_t *meshlet_triangles;

@@ -7,7 +7,7 @@
 struct geometry {
     float (*positions)[3];
     float (*normals)[3];  /* unit */
-    float (*tangents)[4]; /* unit, w +-1; NULL: none */
+    float (*tangents)[4]; /* unit or 0, w +-1; NULL: none */
     float (*uv)[2][2];
     uint8_t (*colors)[4];
     uint32_t *sources; /* the caller's vertex that each was made of */
@@ -21,8 +21,9 @@ bool psc_geometry_create(
     struct geometry *geometry, const struct psc_mesh *mesh, struct pen_error *error);
 void psc_geometry_finish(struct geometry *geometry);
 
-/* Fills geometry->tangents from uv set 0; vertices used with both handednesses are split. */
-void psc_geometry_make_tangents(struct geometry *geometry);
+/* Fills geometry->tangents from the uv that a normal map is looked up at; vertices used with both
+ * handednesses are split. */
+void psc_geometry_make_tangents(struct geometry *geometry, const struct psc_texture_ref *map);
 
 /* enum psc_primitive_flags. Watertight: every edge, vertices joined by position, is shared by exactly
  * two triangles that run through it in opposite directions. Triangles without three distinct corners

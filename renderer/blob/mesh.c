@@ -186,8 +186,8 @@ bool psc_geometry_create(struct geometry *g, const struct psc_mesh *mesh, struct
         normalize_normals(g);
     if (g->tangents)
         normalize_tangents(g);
-    else if (mesh->need_tangents && mesh->uv0)
-        psc_geometry_make_tangents(g);
+    else if (mesh->normal_map && (mesh->normal_map->uv_set & 1 ? mesh->uv1 : mesh->uv0))
+        psc_geometry_make_tangents(g, mesh->normal_map);
     return true;
 }
 

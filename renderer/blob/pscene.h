@@ -56,7 +56,8 @@ struct psc_header {
 
 struct psc_attributes {
     int16_t normal[4];  /* snorm xyz, unit; w 0 */
-    int16_t tangent[4]; /* snorm xyz, unit; w = +-32767, the bitangent's sign; all 0: none */
+    int16_t tangent[4]; /* snorm xyz, unit or 0, not always across the normal; w = +-32767, the
+                           bitangent's sign; all 0: none */
     float uv[2][2];
     uint8_t color[4]; /* unorm, linear RGBA */
 };

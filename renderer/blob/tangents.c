@@ -1,52 +1,51 @@
-/* Tangents from texture coordinates: each triangle's direction of growing u, accumulated per vertex
- * with the corner's angle as weight, then made orthogonal to the normal. The bitangent,
- * w * cross(normal, tangent), points against growing v: up in the image, where green points. */
+/* Tangents from texture coordinates, as a normal map is looked up: the direction of growing u,
+ * summed up per vertex. What moves the whole mesh moves them alike: weights are taken in texture
+ * space, and a tangent is made orthogonal to the normal where both are known in the world, so that a
+ * node that shears gives what sheared vertices do. The bitangent, w * cross(normal, tangent), points
+ * against growing v: up in the image, where green points. */
 #include "protocol/memory.h"
 #include "renderer/blob/geometry.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-/* Direction of growing u (unit) and the sign of the uv area; false when uv or
- * positions span none. */
-static bool triangle_tangent(
-    const struct geometry *g, const uint32_t *t, double tangent[3], int *side)
+/* A triangle in the texture. */
+struct patch {
+    double uv[3][2];
+    double area; /* twice, with its sign */
+};
+
+static struct patch patch_of(
+    const struct geometry *g, const struct psc_texture_ref *map, const uint32_t *t)
 {
-    const float(*uv[3])[2] = {g->uv[t[0]], g->uv[t[1]], g->uv[t[2]]};
-    double du1 = (double)uv[1][0][0] - uv[0][0][0], dv1 = (double)uv[1][0][1] - uv[0][0][1];
-    double du2 = (double)uv[2][0][0] - uv[0][0][0], dv2 = (double)uv[2][0][1] - uv[0][0][1];
-    double area = du1 * dv2 - du2 * dv1;
-    if (area == 0)
-        return false;
-    double length = 0;
+    struct patch p;
+    for (int c = 0; c < 3; c++) {
+        const float *uv = g->uv[t[c]][map->uv_set & 1];
+        for (int r = 0; r < 2; r++) /* without the offset, which is no direction */
+            p.uv[c][r] =
+                (double)map->transform[3 * r] * uv[0] + (double)map->transform[3 * r + 1] * uv[1];
+    }
+    p.area = (p.uv[1][0] - p.uv[0][0]) * (p.uv[2][1] - p.uv[0][1]) -
+             (p.uv[2][0] - p.uv[0][0]) * (p.uv[1][1] - p.uv[0][1]);
+    return p;
+}
+
+/* How far it goes per u, times the patch's area. */
+static void gradient(
+    const struct geometry *g, const uint32_t *t, const struct patch *p, double out[3])
+{
+    double dv1 = p->uv[1][1] - p->uv[0][1], dv2 = p->uv[2][1] - p->uv[0][1];
     for (int k = 0; k < 3; k++) {
         double e1 = (double)g->positions[t[1]][k] - g->positions[t[0]][k];
         double e2 = (double)g->positions[t[2]][k] - g->positions[t[0]][k];
-        tangent[k] = (e1 * dv2 - e2 * dv1) * (area < 0 ? -1 : 1);
-        length += tangent[k] * tangent[k];
+        out[k] = (e1 * dv2 - e2 * dv1) * (p->area < 0 ? -1 : 1);
     }
-    length = sqrt(length);
-    if (!(length > 0))
-        return false;
-    for (int k = 0; k < 3; k++)
-        tangent[k] /= length;
-    *side = area > 0;
-    return true;
 }
 
-static double corner_angle(const struct geometry *g, const uint32_t *t, int corner)
+static double corner_angle(const struct patch *p, int corner)
 {
-    const float *p = g->positions[t[corner]];
-    const float *q = g->positions[t[(corner + 1) % 3]], *r = g->positions[t[(corner + 2) % 3]];
-    double qq = 0, rr = 0, qr = 0;
-    for (int k = 0; k < 3; k++) {
-        double a = (double)q[k] - p[k], b = (double)r[k] - p[k];
-        qq += a * a;
-        rr += b * b;
-        qr += a * b;
-    }
-    double cosine = qr / sqrt(qq * rr);
-    return cosine >= 1 || !(qq * rr > 0) ? 0 : cosine <= -1 ? M_PI : acos(cosine);
+    const double *o = p->uv[corner], *q = p->uv[(corner + 1) % 3], *r = p->uv[(corner + 2) % 3];
+    return fabs(atan2(p->area, (q[0] - o[0]) * (r[0] - o[0]) + (q[1] - o[1]) * (r[1] - o[1])));
 }
 
 static uint32_t copy_vertex(struct geometry *g, uint32_t from)
@@ -68,28 +67,16 @@ static uint32_t copy_vertex(struct geometry *g, uint32_t from)
     return to;
 }
 
-/* The unit vector across n nearest to sum, or any when there is none. */
-static void orthonormalize(const float n[3], const double sum[3], float tangent[3])
+/* One without a direction stays 0, and its vertex unbent. */
+static void store(const double sum[3], bool mirrored, float tangent[4])
 {
-    double t[3], dot = n[0] * sum[0] + n[1] * sum[1] + n[2] * sum[2], length = 0;
-    for (int k = 0; k < 3; k++) {
-        t[k] = sum[k] - dot * n[k];
-        length += t[k] * t[k];
-    }
-    if (!(length > 1e-12)) {
-        int least = fabsf(n[0]) < fabsf(n[1]) ? 0 : 1;
-        least = fabsf(n[2]) < fabsf(n[least]) ? 2 : least;
-        length = 0;
-        for (int k = 0; k < 3; k++) {
-            t[k] = (k == least) - (double)n[least] * n[k];
-            length += t[k] * t[k];
-        }
-    }
+    double length = sqrt(sum[0] * sum[0] + sum[1] * sum[1] + sum[2] * sum[2]);
     for (int k = 0; k < 3; k++)
-        tangent[k] = (float)(t[k] / sqrt(length));
+        tangent[k] = length > 0 && isfinite(length) ? (float)(sum[k] / length) : 0;
+    tangent[3] = mirrored ? -1 : 1;
 }
 
-void psc_geometry_make_tangents(struct geometry *g)
+void psc_geometry_make_tangents(struct geometry *g, const struct psc_texture_ref *map)
 {
     uint32_t before = g->vertex_count;
     /* Per vertex and side. */
@@ -98,16 +85,17 @@ void psc_geometry_make_tangents(struct geometry *g)
     memset(sums, 0, before * sizeof *sums);
     memset(used, 0, before * sizeof *used);
     for (uint32_t i = 0; i < g->index_count; i += 3) {
-        double tangent[3];
-        int side;
-        if (!triangle_tangent(g, &g->indices[i], tangent, &side))
+        struct patch patch = patch_of(g, map, &g->indices[i]);
+        double along[3];
+        if (patch.area == 0)
             continue;
+        gradient(g, &g->indices[i], &patch, along);
         for (int c = 0; c < 3; c++) {
             uint32_t v = g->indices[i + c];
-            double weight = corner_angle(g, &g->indices[i], c);
+            double weight = corner_angle(&patch, c);
             for (int k = 0; k < 3; k++)
-                sums[v][side][k] += weight * tangent[k];
-            used[v][side] = true;
+                sums[v][patch.area > 0][k] += weight * along[k];
+            used[v][patch.area > 0] = true;
         }
     }
 
@@ -115,23 +103,17 @@ void psc_geometry_make_tangents(struct geometry *g)
     uint32_t *twins = pen_alloc(before, sizeof *twins);
     for (uint32_t v = 0; v < before; v++)
         twins[v] = used[v][0] && used[v][1] ? copy_vertex(g, v) : v;
-    for (uint32_t i = 0; g->vertex_count > before && i < g->index_count; i += 3) {
-        double tangent[3];
-        int side;
-        if (triangle_tangent(g, &g->indices[i], tangent, &side) && side)
+    for (uint32_t i = 0; g->vertex_count > before && i < g->index_count; i += 3)
+        if (patch_of(g, map, &g->indices[i]).area > 0)
             for (int c = 0; c < 3; c++)
                 g->indices[i + c] = twins[g->indices[i + c]];
-    }
 
     g->tangents = pen_alloc(g->vertex_count, sizeof *g->tangents);
     for (uint32_t v = 0; v < before; v++) {
-        int side = used[v][0] ? 0 : used[v][1];
-        orthonormalize(g->normals[v], sums[v][side], g->tangents[v]);
-        g->tangents[v][3] = side ? -1 : 1;
-        if (twins[v] == v)
-            continue;
-        orthonormalize(g->normals[v], sums[v][1], g->tangents[twins[v]]);
-        g->tangents[twins[v]][3] = -1;
+        bool side = !used[v][0] && used[v][1];
+        store(sums[v][side], side, g->tangents[v]);
+        if (twins[v] != v)
+            store(sums[v][1], true, g->tangents[twins[v]]);
     }
     free(twins);
     free(used);

@@ -101,7 +101,7 @@ bool model_to_blob(const struct model *model, const uint8_t source[PEN_ID_BYTES]
             .indices = s->indices,
             .index_count = s->index_count,
             .material = model->meshes[i].material,
-            .need_tangents = material->normal.texture >= 0};
+            .normal_map = material->normal.texture >= 0 ? &material->normal : NULL};
         uint32_t primitive;
         ok = psc_builder_add_mesh(builder, &mesh, &primitive, error);
     }

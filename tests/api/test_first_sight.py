@@ -63,15 +63,22 @@ def columns_of(m, move=(0, 0, 0)):
 TILTS = ((208, 168, 218), (48, 88, 218))
 
 
-def bent(points, normals, tangents, indices, tilt, **node):
-    """A shape in which a normal map of one colour bends every normal; the node may have instances."""
+def bent(points, normals, tangents, indices, tilt, uv=None, uv_set=0, transform=None, **node):
+    """A shape in which a normal map of one colour bends every normal; the node may have instances.
+    Every four points span the texture unless uv says otherwise."""
     b = pose_files.Builder()
     corners = ([0, 0], [1, 0], [1, 1], [0, 1])
+    uv = uv or [corners[k % 4] for k in range(len(points))]
     b.json["images"] = [{"bufferView": b.view(png([[tilt]], 2, 8)), "mimeType": "image/png"}]
     b.json["textures"] = [{"source": 0}]
-    b.json["materials"] = [{"doubleSided": True, "normalTexture": {"index": 0}}]
+    b.json["materials"] = [{"doubleSided": True, "normalTexture": {"index": 0, "texCoord": uv_set}}]
+    if transform:
+        b.json["extensionsUsed"] = ["KHR_texture_transform"]
+        b.json["materials"][0]["normalTexture"]["extensions"] = {"KHR_texture_transform": transform}
     attributes = {"POSITION": b.floats("VEC3", points), "NORMAL": b.floats("VEC3", normals),
-                  "TEXCOORD_0": b.floats("VEC2", [corners[k % 4] for k in range(len(points))])}
+                  "TEXCOORD_0": b.floats("VEC2", [[0, 0]] * len(uv) if uv_set else uv)}
+    if uv_set:
+        attributes["TEXCOORD_1"] = b.floats("VEC2", uv)
     if tangents:
         attributes["TANGENT"] = b.floats("VEC4", tangents)
     b.json["meshes"] = [{"primitives": [{
@@ -84,6 +91,27 @@ def bent(points, normals, tangents, indices, tilt, **node):
         node["extensions"] = {"EXT_mesh_gpu_instancing": {"attributes": attributes}}
     b.node(True, mesh=0, **node)
     return b.glb()
+
+
+def knot(rings=20, sides=8):
+    """A closed tube around the origin with smooth normals that lean, uneven triangles and a texture
+    that is wound around it, mirrored in one half; vertices at multiples of 1/256."""
+    points, normals, uv, indices = [], [], [], []
+    for i in range(rings + 1):
+        a = 2 * math.pi * (i % rings) / rings
+        for k in range(sides + 1):
+            c = 2 * math.pi * (k % sides) / sides + 0.4 * math.sin(a)
+            tube = [math.cos(a) * math.cos(c), math.sin(c) + 0.4 * math.sin(2 * a),
+                    math.sin(a) * math.cos(c)]
+            points.append([round(256 * (b * r + 0.45 * t)) / 256 for b, r, t in zip(
+                (math.cos(a), math.sin(2 * a), math.sin(a)), (1, 0.3, 1), tube)])
+            normals.append(unit(tube))
+            uv.append([3 * abs(i - rings / 2) / rings + 0.2 * k / sides, k / sides])
+    for i in range(rings):
+        for k in range(sides):
+            a, b = i * (sides + 1) + k, (i + 1) * (sides + 1) + k
+            indices += [a, a + 1, b, b, a + 1, b + 1]
+    return points, normals, uv, indices
 
 
 class FirstSight(unittest.TestCase):
@@ -139,11 +167,6 @@ class FirstSight(unittest.TestCase):
             along = [b - a for a, b in zip(*first)]
             dot = sum(a * b for a, b in zip(along, n))
             tangents.append(unit([a - dot * b for a, b in zip(along, n)]) + [1])
-        flat = [unit([y[(k + 1) % 3] * z[(k + 2) % 3] - y[(k + 2) % 3] * z[(k + 1) % 3]
-                      for k in range(3)])
-                for f in range(0, 24, 4)
-                for y, z in [[[b - a for a, b in zip(points[f + i], points[f + i + 1])]
-                              for i in (0, 1)]] for _ in range(4)]
         rng = random.Random(9)
         mirrors = 0
         for n in range(12):
@@ -160,7 +183,7 @@ class FirstSight(unittest.TestCase):
                       (1 - 2 * (x * x + y * y)) * size[2]]]
             turned, mirrored = inverse_transpose(m), determinant(m) < 0
             mirrors += mirrored
-            given, used = (tangents, normals) if n % 3 < 2 else (None, flat)
+            given, used = tangents if n % 3 < 2 else None, normals
             node = {"matrix": columns_of(m)} if n % 3 else {
                 "instance": {"ROTATION": turn, "SCALE": size}}
             baked = [unit(multiply(m, t[:3])) + [-1 if mirrored else 1] for t in given or ()]
@@ -172,6 +195,58 @@ class FirstSight(unittest.TestCase):
                                  (indices[k:k + 3][::-1] if mirrored else indices[k:k + 3])],
                          TILTS[0]))
         self.assertGreater(mirrors, 3)
+
+    def test_made_tangents_are_the_baked_ones(self):
+        """A curved mesh without tangents, sheared and mirrored by its node or in the file."""
+        points, normals, uv, indices = knot()
+        rng = random.Random(11)
+        mirrors = 0
+        for n in range(50):
+            m = random_matrix(rng)
+            turned, mirrored = inverse_transpose(m), determinant(m) < 0
+            mirrors += mirrored
+            with self.subTest(transform=n):
+                self.same_normals(
+                    bent(points, normals, None, indices, TILTS[0], uv, matrix=columns_of(m)),
+                    bent([multiply(m, p) for p in points],
+                         [unit(multiply(turned, v)) for v in normals], None,
+                         [i for k in range(0, len(indices), 3) for i in
+                          (indices[k:k + 3][::-1] if mirrored else indices[k:k + 3])],
+                         TILTS[0], uv))
+        self.assertGreater(mirrors, 10)
+
+    def test_normal_maps_lie_as_they_are_looked_up(self):
+        """Made tangents follow the texture's set and its transform: turned, stretched, mirrored."""
+        points, normals, uv, indices = knot()
+        rng = random.Random(12)
+        for n in range(8):
+            turn, size = rng.uniform(-3, 3), [rng.choice((-1, 1)) * rng.uniform(0.3, 3)
+                                              for _ in range(2)]
+            c, s = math.cos(turn), math.sin(turn)  # KHR_texture_transform: T R S
+            moved = [[c * size[0] * u + s * size[1] * v, -s * size[0] * u + c * size[1] * v]
+                     for u, v in uv]
+            for uv_set in (0, 1):
+                with self.subTest(transform=n, uv_set=uv_set):
+                    self.same_normals(
+                        bent(points, normals, None, indices, TILTS[0], uv, uv_set,
+                             {"rotation": turn, "scale": size, "offset": [0.5, 0.25]}),
+                        bent(points, normals, None, indices, TILTS[0], moved))
+            # On a sheet, worked out by hand: the bump leans along growing u, and green up.
+            sheet = [[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]
+            file = bent(sheet, [[0, 0, 1]] * 4, None, [0, 1, 2, 0, 2, 3], TILTS[0],
+                        [[p[0], -p[1]] for p in sheet], 1, {"rotation": turn, "scale": size})
+            tilt = [x / 127.5 - 1 for x in TILTS[0]]
+            along = unit([c / size[0], -s / size[1], 0])
+            up = [-along[1], along[0], 0]
+            if up[0] * s / size[0] + up[1] * c / size[1] < 0:  # against growing v
+                up = [-x for x in up]
+            bump = unit([a * tilt[0] + b * tilt[1] + z * tilt[2]
+                         for a, b, z in zip(along, up, (0, 0, 1))])
+            seen = self.picture(self.d.upload(file), ground=False, output={"layer": "normal"},
+                                camera={"eye": [0, 0, 5], "target": [0, 0, 0], "fov_y_deg": 30})
+            middle = seen[SIZE["height"] // 2 * SIZE["width"] + SIZE["width"] // 2]
+            for value, expected in zip(middle, bump):
+                self.assertAlmostEqual(value, 127.5 * (1 + expected), delta=3)
 
     def test_normal_maps_from_behind(self):
         """A bump is a dent there, leaning the same way in the world."""

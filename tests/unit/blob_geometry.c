@@ -135,6 +135,8 @@ static void cross(const double a[3], const double b[3], double c[3])
         c[k] = a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3];
 }
 
+static const struct psc_texture_ref plain = {.transform = {1, 0, 0, 0, 1, 0}};
+
 /* A strip of two quads in the plane z = 0 whose u is mirrored at x = 0, as on a symmetric body. */
 static void tangents_of_mirrored_strip(void)
 {
@@ -149,7 +151,7 @@ static void tangents_of_mirrored_strip(void)
         .vertex_count = 6,
         .indices = indices,
         .index_count = 12,
-        .need_tangents = true};
+        .normal_map = &plain};
     struct psc_scene s;
     void *data = build_one(&mesh, &s);
     CHECK(s.vertex_count == 8); /* the two vertices on the seam are split */
@@ -167,7 +169,7 @@ static void tangents_of_mirrored_strip(void)
     }
     free(data);
 
-    mesh.need_tangents = false;
+    mesh.normal_map = NULL;
     data = build_one(&mesh, &s);
     CHECK(s.attributes[0].tangent[3] == 0 && s.attributes[0].tangent[0] == 0);
     free(data);
@@ -210,7 +212,7 @@ static struct psc_mesh torus_mesh(double tube)
         .vertex_count = TORUS,
         .indices = torus_indices,
         .index_count = CORNERS,
-        .need_tangents = true};
+        .normal_map = &plain};
 }
 
 static void tangents_of_a_torus(void)
@@ -224,7 +226,7 @@ static void tangents_of_a_torus(void)
         decode(s.attributes[k].tangent, t);
         decode(s.attributes[k].normal, n);
         CHECK_NEAR(t[0] * -sin(u) + t[2] * -cos(u), 1, 5e-3);
-        CHECK_NEAR(t[0] * n[0] + t[1] * n[1] + t[2] * n[2], 0, 1e-4);
+        CHECK_NEAR(t[0] * n[0] + t[1] * n[1] + t[2] * n[2], 0, 0.08); /* half a ring, 2 pi / 96 */
         CHECK(s.attributes[k].tangent[3] == 32767);
     }
     free(data);

@@ -87,8 +87,15 @@ uint32_t imp_material(struct imp_context *context, int32_t material)
     return context->materials[slot];
 }
 
-bool imp_material_has_normal_map(const struct imp_context *context, int32_t material)
+bool imp_material_normal_map(
+    const struct imp_context *context, int32_t material, struct psc_texture_ref *map)
 {
-    return material >= 0 && (uint32_t)material < context->model->material_count &&
-           context->model->materials[material].normal.texture >= 0;
+    if (material < 0 || (uint32_t)material >= context->model->material_count)
+        return false;
+    const struct gltf_texture_info *info = &context->model->materials[material].normal;
+    const struct psc_map_rest rest = map_rest(info);
+    *map = psc_material_default().normal;
+    map->uv_set = info->uv_set > 1 ? 0 : info->uv_set;
+    pose_texture_transform(&rest, map->transform);
+    return info->texture >= 0;
 }

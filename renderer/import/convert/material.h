@@ -5,5 +5,6 @@
 uint32_t imp_material(struct imp_context *context, int32_t material);
 /* What glTF says of it, before the blob's products and without its number. */
 struct psc_material_rest imp_material_rest(const struct gltf_material *material);
-/* True when it needs tangents. */
-bool imp_material_has_normal_map(const struct imp_context *context, int32_t material);
+/* Where its normal map is looked up at rest; false when it has none. */
+bool imp_material_normal_map(
+    const struct imp_context *context, int32_t material, struct psc_texture_ref *map);

@@ -228,6 +228,7 @@ bool imp_geometry_read(
     }
     if (!imp_reader_init(&positions, context->document, context->model, primitive->position, error))
         return false;
+    g->has_normal_map = imp_variants_normal_map(context, number, &g->normal_map);
     if (positions.count > IMP_MAX_ACCESSOR)
         return pen_fail(
             error, PEN_TOO_BIG, "", "The scene has more than %u vertices.", IMP_MAX_ACCESSOR);
@@ -255,7 +256,7 @@ struct psc_mesh imp_geometry_mesh(
         .indices = g->indices,
         .index_count = g->index_count,
         .material = imp_material(context, material),
-        .need_tangents = imp_variants_need_tangents(context, number),
+        .normal_map = g->has_normal_map ? &g->normal_map : NULL,
         .meshlet_triangles = g->meshlet_triangles,
         .meshlet_count = g->meshlet_count,
         .points = (const float(*)[3])g->points,

@@ -17,14 +17,15 @@ void imp_variants_note(struct imp_context *context, uint32_t primitive, uint32_t
     }
 }
 
-bool imp_variants_need_tangents(const struct imp_context *context, uint32_t primitive)
+bool imp_variants_normal_map(
+    const struct imp_context *context, uint32_t primitive, struct psc_texture_ref *map)
 {
     const struct gltf_primitive *from = &context->model->primitives[primitive];
-    bool need = imp_material_has_normal_map(context, from->material);
-    for (uint32_t i = 0; i < from->mapping_count; i++)
-        need |= imp_material_has_normal_map(
-            context, context->model->mappings[from->first_mapping + i].material);
-    return need;
+    bool found = imp_material_normal_map(context, from->material, map);
+    for (uint32_t i = 0; !found && i < from->mapping_count; i++)
+        found = imp_material_normal_map(
+            context, context->model->mappings[from->first_mapping + i].material, map);
+    return found;
 }
 
 static int by_variant(const void *a, const void *b)

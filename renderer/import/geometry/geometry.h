@@ -1,7 +1,6 @@
 /* The triangles of one glTF primitive on their way into the blob. */
 #pragma once
-#include <stdbool.h>
-#include <stdint.h>
+#include "renderer/blob/pscene.h"
 
 struct imp_geometry {
     float (*positions)[3];
@@ -15,6 +14,8 @@ struct imp_geometry {
     uint32_t point_count;
     float base[3]; /* that positions and points are relative to: solids are small, far from 0 */
     bool closed;   /* of solids that face outwards, as is known */
+    struct psc_texture_ref normal_map; /* that tangents are made for */
+    bool has_normal_map;
     uint32_t vertex_count;
     uint32_t *indices;
     uint32_t index_count;

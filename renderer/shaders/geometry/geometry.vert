@@ -56,8 +56,9 @@ void main()
     float side = dot(row0.xyz, cross(row1.xyz, row2.xyz)) < 0.0 ? -1.0 : 1.0;
     v_normal *= side * inversesqrt(max(dot(v_normal, v_normal), 1e-36));
     // What mirrors turns the cross product round that gives the bitangent.
-    v_tangent = vec4(dot(row0.xyz, tangent.xyz), dot(row1.xyz, tangent.xyz),
-        dot(row2.xyz, tangent.xyz), tangent.w * side);
+    vec3 along =
+        vec3(dot(row0.xyz, tangent.xyz), dot(row1.xyz, tangent.xyz), dot(row2.xyz, tangent.xyz));
+    v_tangent = vec4(along * inversesqrt(max(dot(along, along), 1e-36)), tangent.w * side);
 #endif
 #endif
 #ifdef FULL

@@ -40,12 +40,30 @@ static bool import_files(struct psc_builder *builder, struct imp_files *files, c
     return import_document(builder, data, files, file->name, error);
 }
 
+/* A zip that holds nothing but another one, as sites pack what was packed. */
+static bool import_packed(struct psc_builder *builder, struct imp_files *files, const char *entry,
+    struct pen_error *error)
+{
+    const struct imp_file *zip = imp_files_inner_zip(files);
+    struct imp_files inner;
+    struct imp_bytes data;
+    if (!zip)
+        return import_files(builder, files, entry, error);
+    if (!imp_files_load(files, zip, &data, error) ||
+        !imp_files_open_zip(&inner, data.data, data.bytes, error))
+        return false;
+    bool done = import_files(builder, &inner, entry, error);
+    imp_files_finish(&inner);
+    return done;
+}
+
 static bool is_json(const uint8_t *data, size_t bytes)
 {
     size_t i = bytes >= 3 && !memcmp(data, "\xef\xbb\xbf", 3) ? 3 : 0; /* byte order mark */
     while (i < bytes && i < 4096 && strchr(" \t\r\n", data[i]) && data[i])
         i++;
-    return i < bytes && data[i] == '{';
+    bool comment = bytes - i > 1 && data[i] == '/' && (data[i + 1] == '/' || data[i + 1] == '*');
+    return i < bytes && (data[i] == '{' || comment); /* which JSON has none of: it is told so */
 }
 
 /* Cuts the choice of an entry off the front of the upload. False when it is damaged. */
@@ -85,7 +103,7 @@ static bool import_scene(
     if (begins(upload, PEN_BUNDLE_MAGIC) || is_zip)
         done = (is_zip ? imp_files_open_zip : imp_files_open_bundle)(
                    &files, upload.data, upload.bytes, error) &&
-               import_files(builder, &files, entry, error);
+               import_packed(builder, &files, entry, error);
     else if (!begins(upload, "glTF") && !is_json(upload.data, upload.bytes))
         pen_fail(error, PEN_UNKNOWN_TYPE, "",
             "The upload is neither glTF binary nor glTF JSON nor a zip of them.%s%s",

@@ -9,6 +9,7 @@
 #define FAKE_PATH "C:/fakepath/"
 #define VARIANTS 4
 #define BLANKS " \t\r\n"
+#define FOLDED (UTF8PROC_CASEFOLD | UTF8PROC_COMPAT | UTF8PROC_IGNORE)
 
 bool pen_name_is_safe(const char *name, size_t bytes)
 {
@@ -43,6 +44,35 @@ static void turn_slashes(char *name)
         *name = '/';
 }
 
+/* Folds empty parts, "." and "..". *climbs: whether it leads above its root, where it then goes on
+ * from. False when it is too long. */
+static bool fold(const char *path, char name[PEN_BUNDLE_MAX_NAME + 1], bool *climbs)
+{
+    size_t out = 0;
+    *climbs = false;
+    for (const char *part = path, *next; part; part = next) {
+        const char *slash = strchr(part, '/');
+        next = slash ? slash + 1 : NULL;
+        size_t bytes = slash ? (size_t)(slash - part) : strlen(part);
+        if ((bytes == 1 && part[0] == '.') || (!bytes && next))
+            continue;
+        if (bytes == 2 && part[0] == '.' && part[1] == '.') {
+            *climbs = *climbs || !out;
+            while (out && name[--out] != '/')
+                ;
+            continue;
+        }
+        if (out + bytes + 1 > PEN_BUNDLE_MAX_NAME)
+            return false;
+        if (out)
+            name[out++] = '/';
+        memcpy(name + out, part, bytes);
+        out += bytes;
+    }
+    name[out] = 0;
+    return true;
+}
+
 bool pen_name_tidy(const char *given, size_t bytes, char name[PEN_BUNDLE_MAX_NAME + 1])
 {
     char whole[2 * PEN_BUNDLE_MAX_NAME + 1];
@@ -56,20 +86,18 @@ bool pen_name_tidy(const char *given, size_t bytes, char name[PEN_BUNDLE_MAX_NAM
         from += strlen(FAKE_PATH);
     else if (is_letter(from[0]) && from[1] == ':' && from[2] == '/')
         from += 3;
-    while (from[0] == '.' && from[1] == '/')
-        from += 2;
-    size_t left = strlen(from);
-    if (!pen_name_is_safe(from, left))
-        return false;
-    memcpy(name, from, left + 1);
-    return true;
+    bool climbs;
+    return from[0] != '/' && fold(from, name, &climbs) && !climbs &&
+           pen_name_is_safe(name, strlen(name));
 }
 
 /* ---- names that are the same to people ---- */
 
 struct pen_name_keys {
     const char *name;
-    char *composed, *folded; /* normal form C, and that without regard to case */
+    /* Normal form C; that without regard to case, to width and other compatible forms, and to what
+     * is not seen. */
+    char *composed, *folded;
     bool doubted;
 };
 
@@ -89,8 +117,8 @@ void pen_names_init(struct pen_names *index, const char *const *names, uint32_t 
     index->count = count;
     index->keys = pen_alloc_zero(count, sizeof *index->keys);
     for (uint32_t i = 0; i < count; i++)
-        index->keys[i] = (struct pen_name_keys){
-            names[i], map(names[i], 0), map(names[i], UTF8PROC_CASEFOLD), false};
+        index->keys[i] =
+            (struct pen_name_keys){names[i], map(names[i], 0), map(names[i], FOLDED), false};
 }
 
 void pen_names_doubt(struct pen_names *index, uint32_t number)
@@ -203,37 +231,46 @@ static bool join(
     const char *base, const char *path, char name[PEN_BUNDLE_MAX_NAME + 1], bool *outside)
 {
     char joined[2 * PEN_BUNDLE_MAX_NAME + 2];
-    size_t n = *outside ? 0 : (size_t)(last_part(base) - base), length = strlen(path), out = 0;
+    bool climbs;
+    size_t n = *outside ? 0 : (size_t)(last_part(base) - base), length = strlen(path);
     if (n + length >= sizeof joined)
         return false;
     memcpy(joined, base, n);
     memcpy(joined + n, path, length + 1);
-    for (char *part = joined, *next; part; part = next) {
-        char *slash = strchr(part, '/');
-        next = slash ? slash + 1 : NULL;
-        size_t bytes = slash ? (size_t)(slash - part) : strlen(part);
-        if ((bytes == 1 && part[0] == '.') || (!bytes && next))
-            continue;
-        if (bytes == 2 && part[0] == '.' && part[1] == '.') {
-            *outside = *outside || !out;
-            while (out && name[--out] != '/')
-                ;
-            continue;
-        }
-        if (out + bytes + 1 > PEN_BUNDLE_MAX_NAME)
+    if (!fold(joined, name, &climbs))
+        return false;
+    *outside = *outside || climbs;
+    return pen_name_is_safe(name, strlen(name));
+}
+
+static bool is_utf8(const char *text)
+{
+    utf8proc_int32_t letter;
+    for (utf8proc_ssize_t bytes; *text; text += bytes)
+        if ((bytes = utf8proc_iterate((const utf8proc_uint8_t *)text, -1, &letter)) < 1)
             return false;
-        if (out)
-            name[out++] = '/';
-        memcpy(name + out, part, bytes);
-        out += bytes;
+    return true;
+}
+
+/* What old scripts escape is Latin-1. In place; there is room for twice the bytes. */
+static void from_latin_1(char *text)
+{
+    size_t bytes = strlen(text), out = bytes;
+    for (size_t i = 0; i < bytes; i++)
+        out += !is_ascii(text[i]);
+    text[out] = 0;
+    while (bytes--) {
+        unsigned char c = (unsigned char)text[bytes];
+        text[--out] = (char)(c < 0x80 ? c : 0x80 | (c & 0x3f));
+        if (c >= 0x80)
+            text[--out] = (char)(0xc0 | c >> 6);
     }
-    name[out] = 0;
-    return pen_name_is_safe(name, out);
 }
 
 /* Copies `bytes` of the URI, decoded or as they are; false when there is a NUL. */
 static bool decode(const char *uri, size_t bytes, bool decoded, char *path)
 {
+    char *start = path;
     for (size_t i = 0; i < bytes; i++) {
         int high = decoded && uri[i] == '%' ? pen_hex_digit(uri[i + 1]) : -1;
         int low = high >= 0 ? pen_hex_digit(uri[i + 2]) : -1;
@@ -243,6 +280,8 @@ static bool decode(const char *uri, size_t bytes, bool decoded, char *path)
             return false;
     }
     *path = 0;
+    if (decoded && !is_utf8(start))
+        from_latin_1(start);
     return true;
 }
 
@@ -272,7 +311,7 @@ static int64_t find(const struct pen_names *index, const char *base, const char 
     if (length > 4 * PEN_BUNDLE_MAX_NAME)
         return PEN_NAME_ELSEWHERE;
     for (int v = 0; v < VARIANTS; v++) {
-        char text[4 * PEN_BUNDLE_MAX_NAME + 1];
+        char text[8 * PEN_BUNDLE_MAX_NAME + 1];
         bool whole = v % 2 == 0, decoded = v < 2;
         outside[count] = false;
         if ((!whole && cut == length) || (!decoded && !memchr(uri, '%', length)))
@@ -286,7 +325,7 @@ static int64_t find(const struct pen_names *index, const char *base, const char 
             continue;
         }
         wanted[count] = (struct pen_name_keys){
-            names[count], map(names[count], 0), map(names[count], UTF8PROC_CASEFOLD), false};
+            names[count], map(names[count], 0), map(names[count], FOLDED), false};
         count++;
     }
     int64_t found = PEN_NAME_UNKNOWN;

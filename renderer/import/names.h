@@ -9,8 +9,9 @@
 /* True for a relative name of '/'-separated parts, none empty, "." or "..", without control
  * characters, backslashes or a colon. */
 bool pen_name_is_safe(const char *name, size_t bytes);
-/* The name that a file of an upload goes by: '\' written as '/', and without "./", a drive or
- * "C:\fakepath\" (which browsers put there) in front. False when that is not safe. */
+/* The name that a file of an upload goes by: '\' written as '/', without a drive or "C:\fakepath\"
+ * (which browsers put there) in front, and with empty parts, "." and ".." folded. False when that is
+ * not safe or leads outside. */
 bool pen_name_tidy(const char *given, size_t bytes, char name[PEN_BUNDLE_MAX_NAME + 1]);
 
 struct pen_name_keys;
@@ -28,7 +29,7 @@ void pen_names_finish(struct pen_names *index);
 enum { PEN_NAME_UNKNOWN = -1, PEN_NAME_AMBIGUOUS = -2, PEN_NAME_ELSEWHERE = -3 };
 /* The number of the name that `uri`, relative to the folder of the file called `base`, means. URIs
  * are taken as written by people: percent-encoded or not, with a query or not, '\' for '/', in
- * either Unicode normal form, and in other case where only one name fits. Of names in doubt the only one
+ * either Unicode normal form, and in other case or width where only one name fits. Of names in doubt the only one
  * that may be the same letters in another code page is taken. `loose`: a file that is
  * not where the URI says, or is said to lie outside the upload, is taken by its last part when only
  * one name ends in it, as forms drop the folders. Else one of the above; PEN_NAME_ELSEWHERE: it is

@@ -391,7 +391,7 @@ def archives():
             locked[at + offset] |= 1
             at += 4
     yield "encrypted.zip", bytes(locked)
-    yield "nested.zip", zipped([("inner.zip", zipped(good))])
+    yield "nested.zip", zipped([("a.zip", zipped([("b.zip", zipped(good))]))])
     packed = bundle(good)
     yield "truncated.bundle", packed[:-1]
     yield "longer.bundle", packed + b"x"

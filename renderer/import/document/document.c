@@ -12,6 +12,7 @@
 #define GLB_JSON 0x4e4f534au
 #define GLB_BIN 0x004e4942u
 
+#define BLANKS " \t\r\n"
 #define MOST_WARNINGS 4 /* of a kind */
 
 static uint32_t u32(const uint8_t *p)
@@ -54,15 +55,42 @@ static bool split_glb(const uint8_t *data, size_t bytes, struct imp_bytes *json,
             *bin = (struct imp_bytes){data + at, chunk_bytes};
         at += chunk_bytes;
     }
-    while (json->bytes && !json->data[json->bytes - 1])
-        json->bytes--; /* some writers pad with zeros */
     return true;
+}
+
+/* What people write into JSON by hand and other parsers let through, at a place or "". */
+static const char *why_not_json(const char *at, const char *end)
+{
+    static const char *const words[] = {
+        "NaN", "nan", "-nan", "Infinity", "-Infinity", "inf", "-inf"};
+    while (at < end && strchr(BLANKS, *at))
+        at++;
+    size_t left = (size_t)(end - at);
+    if (left > 1 && at[0] == '/' && (at[1] == '/' || at[1] == '*'))
+        return ": JSON has no comments; take them out";
+    if (left && (*at == '}' || *at == ']'))
+        return ": in JSON no comma stands before a closing bracket";
+    if (left && *at == '\'')
+        return ": JSON's strings stand in double quotes";
+    for (size_t i = 0; i < sizeof words / sizeof *words; i++)
+        if (left > strlen(words[i]) && !memcmp(at, words[i], strlen(words[i])))
+            return ": JSON's numbers are finite";
+    return "";
+}
+
+/* The parser says where it stopped, which may be one byte on. */
+static const char *why_no_json(const char *text, const char *at, const char *end)
+{
+    const char *why = why_not_json(at, end);
+    return *why || at == text ? why : why_not_json(at - 1, end);
 }
 
 static bool parse(struct imp_document *document, struct imp_bytes json, struct psc_builder *builder,
     struct pen_error *error)
 {
     const char *text = (const char *)json.data, *end = NULL;
+    while (json.bytes && !json.data[json.bytes - 1])
+        json.bytes--; /* some writers pad with zeros */
     if (json.bytes > IMP_MAX_JSON_BYTES)
         return pen_fail(
             error, PEN_TOO_BIG, "", "The glTF's JSON has more than %u bytes.", IMP_MAX_JSON_BYTES);
@@ -70,10 +98,11 @@ static bool parse(struct imp_document *document, struct imp_bytes json, struct p
         return false;
     document->root = cJSON_ParseWithLengthOpts(text, json.bytes, &end, 0);
     if (!document->root)
-        return pen_fail(error, PEN_INVALID, "", "The glTF's JSON cannot be parsed, near byte %zu.",
-            end ? (size_t)(end - text) : 0);
+        return pen_fail(error, PEN_INVALID, "",
+            "The glTF's JSON cannot be parsed, near byte %zu%s.", end ? (size_t)(end - text) : 0,
+            end ? why_no_json(text, end, text + json.bytes) : "");
     for (; end < text + json.bytes; end++)
-        if (!strchr(" \t\r\n", *end))
+        if (!strchr(BLANKS, *end))
             return pen_fail(error, PEN_INVALID, "", "The glTF's JSON is followed by something.");
     return imp_repair_version(document->root, builder, error) &&
            imp_schema_check(document->root, builder, error);

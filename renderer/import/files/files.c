@@ -191,8 +191,24 @@ static bool is_litter(const char *name)
 
 static bool is_scene(const struct imp_file *file)
 {
-    return (has_suffix(file->name, ".gltf") || has_suffix(file->name, ".glb")) &&
-           !is_litter(file->name);
+    static const char *const suffixes[] = {".gltf", ".glb", ".vrm"};
+    bool any = false;
+    for (size_t i = 0; i < sizeof suffixes / sizeof *suffixes; i++)
+        any |= has_suffix(file->name, suffixes[i]);
+    return any && !is_litter(file->name);
+}
+
+const struct imp_file *imp_files_inner_zip(const struct imp_files *files)
+{
+    const struct imp_file *found = NULL;
+    for (uint32_t i = 0; i < files->count; i++) {
+        const struct imp_file *file = &files->items[i];
+        bool zip = has_suffix(file->name, ".zip") && !is_litter(file->name);
+        if (is_scene(file) || (zip && found))
+            return NULL;
+        found = zip ? file : found;
+    }
+    return found;
 }
 
 static uint32_t depth_of(const char *name)

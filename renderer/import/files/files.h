@@ -38,6 +38,8 @@ bool imp_files_open_zip(
     struct imp_files *files, const uint8_t *data, size_t bytes, struct pen_error *error);
 void imp_files_finish(struct imp_files *files);
 
+/* The only zip among files of which none is a scene; NULL: that is not how it is. */
+const struct imp_file *imp_files_inner_zip(const struct imp_files *files);
 /* The .glb or .gltf to import: what `entry` names; when it is NULL, the one nearest to the root, and
  * *others tells whether there are more. PEN_INVALID when there is none, or more than one there. */
 const struct imp_file *imp_files_document(

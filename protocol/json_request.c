@@ -428,6 +428,15 @@ bool pen_request_from_tree(const cJSON *root, bool text, const struct pen_catalo
            pen_request_check(request, catalogue, error);
 }
 
+bool pen_rows_from_tree(const cJSON *node, struct pen_param_table table, void *object,
+    const char *pointer, struct pen_error *error)
+{
+    struct reader reader = {.error = error};
+    struct group group = {table, object};
+    snprintf(reader.pointer, sizeof reader.pointer, "%s", pointer);
+    return read_object(&reader, node, &group, 1, NULL, 0);
+}
+
 bool pen_request_from_json(const char *text, size_t bytes, const struct pen_catalogue *catalogue,
     struct pen_request *request, struct pen_error *error)
 {

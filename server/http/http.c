@@ -195,6 +195,13 @@ void http_answer_stream(
         (struct http_body){.release = stream.release, .owner = stream.owner});
 }
 
+void http_answer_file(
+    struct http_exchange *x, uint32_t status, const char *content_type, struct http_file file)
+{
+    x->file = file;
+    http_answer(x, status, content_type, (struct http_body){.size = file.bytes});
+}
+
 void http_sleep(struct http_exchange *x)
 {
     door_set(x->listener->door, x->fd, DOOR_BUSY, 0);
@@ -263,6 +270,15 @@ static void limit_unsent(struct http_exchange *x, int bytes)
 
 static struct MHD_Response *make_response(struct http_exchange *x)
 {
+    if (x->file.fd > 0) {
+        int fd = x->file.fd;
+        x->file.fd = -1; /* the response's */
+        struct MHD_Response *response =
+            MHD_create_response_from_fd_at_offset64(x->file.bytes, fd, x->file.offset);
+        if (!response)
+            close(fd);
+        return response;
+    }
     if (!x->stream.read) /* released in completed() */
         return MHD_create_response_from_buffer(
             x->body.size, (void *)x->body.data, MHD_RESPMEM_PERSISTENT);
@@ -411,6 +427,8 @@ static void on_completed(void *context, struct MHD_Connection *connection, void 
         listener->config.callbacks->completed(x);
         if (x->answered && x->body.release)
             x->body.release(x->body.owner);
+        if (x->file.fd > 0) /* nobody was left to send it to */
+            close(x->file.fd);
     }
     if (x->stream.read)
         limit_unsent(x, 0);

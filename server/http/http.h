@@ -30,6 +30,12 @@ struct http_stream {
     void *owner;
 };
 
+/* A part of a file to send; `fd` is closed when it is sent. */
+struct http_file {
+    int fd;
+    uint64_t offset, bytes;
+};
+
 struct http_header {
     char name[40], value[600];
 };
@@ -48,7 +54,8 @@ struct http_exchange {
     uint32_t status;
     struct http_body body; /* of a stream, its size is what was sent so far */
     struct http_stream stream;
-    bool aborted; /* the client did not get all of the answer */
+    struct http_file file; /* fd 0: none */
+    bool aborted;          /* the client did not get all of the answer */
     /* http.c's own: */
     struct http_header headers[HTTP_MAX_HEADERS];
     uint32_t header_count;
@@ -102,6 +109,9 @@ void http_answer(struct http_exchange *exchange, uint32_t status, const char *co
 /* Answers with a stream, in the same way; nothing is sent of it when only the header is asked for. */
 void http_answer_stream(struct http_exchange *exchange, uint32_t status, const char *content_type,
     struct http_stream stream);
+/* Answers with a part of a file, in the same way. Takes the descriptor. */
+void http_answer_file(struct http_exchange *exchange, uint32_t status, const char *content_type,
+    struct http_file file);
 /* Inside `read`, which then returns 0, and before another thread can wake it: the stream has nothing
  * more until http_wake, from any thread, once. */
 void http_sleep(struct http_exchange *exchange);

@@ -17,6 +17,7 @@ libmicrohttpd-dev
 libopenexr-dev
 libseccomp-dev
 libspng-dev
+libsqlite3-dev
 libssl-dev
 libtiff-dev
 libtinygltf-dev

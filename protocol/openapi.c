@@ -48,6 +48,20 @@ static void write_parts(struct pen_json *json)
     }
 }
 
+static void write_events(struct pen_json *json)
+{
+    pen_json_object(json, "text/event-stream");
+    pen_json_object(json, "schema");
+    pen_json_string(json, "type", "string");
+    pen_json_string(json, "description",
+        "`state`: the job changed its state; its data is the job. `frame`: one more is there; its "
+        "data has its `frame`, `bytes`, `href`, and of the job `done` and `total`. Every event has "
+        "an id: with the last one in Last-Event-ID, what came after it is sent. The stream ends "
+        "with the job, and when nothing is left to tell the answer is 204.");
+    pen_json_end(json);
+    pen_json_end(json);
+}
+
 static void write_content(struct pen_json *json, enum pen_body body)
 {
     static const char *const schemas[] = {
@@ -71,6 +85,20 @@ static void write_content(struct pen_json *json, enum pen_body body)
             write_media(json, pen_format_mime[i], NULL);
         write_media(json, "application/json", SCHEMA "Record");
         write_parts(json);
+        break;
+    case PEN_BODY_FRAME:
+        for (uint32_t i = 0; i < PEN_FORMATS; i++)
+            write_media(json, pen_format_mime[i], NULL);
+        write_media(json, "application/json", SCHEMA "RenderRequest");
+        break;
+    case PEN_BODY_RESULT:
+        for (uint32_t i = 0; i < PEN_FORMATS; i++)
+            write_media(json, pen_format_mime[i], NULL);
+        write_media(json, "application/json", SCHEMA "Comparison");
+        write_media(json, "application/zip", NULL);
+        break;
+    case PEN_BODY_EVENTS:
+        write_events(json);
         break;
     case PEN_BODY_PAGE:
         write_media(json, "text/html", NULL);
@@ -211,16 +239,20 @@ static void write_request_queries(struct pen_json *json, const struct pen_catalo
 static void write_parameters(
     struct pen_json *json, const struct pen_route *route, const struct pen_catalogue *catalogue)
 {
-    static const char *const placeholders[] = {"{id}", "{name}"};
+    static const char *const placeholders[][3] = {
+        {"{id}", "id", "{\"$ref\":\"" SCHEMA "Id\"}"},
+        {"{name}", "name", "{\"$ref\":\"" SCHEMA "TechniqueName\"}"},
+        {"{number}", "number", "{\"type\":\"integer\",\"minimum\":0}"},
+    };
     pen_json_array(json, "parameters");
-    for (int i = 0; i < 2; i++) {
-        if (!strstr(route->pattern, placeholders[i]))
+    for (int i = 0; i < 3; i++) {
+        if (!strstr(route->pattern, placeholders[i][0]))
             continue;
         pen_json_object(json, NULL);
-        pen_json_string(json, "name", i ? "name" : "id");
+        pen_json_string(json, "name", placeholders[i][1]);
         pen_json_string(json, "in", "path");
         pen_json_bool(json, "required", true);
-        write_ref(json, "schema", i ? SCHEMA "TechniqueName" : SCHEMA "Id");
+        pen_json_raw(json, "schema", placeholders[i][2]);
         pen_json_end(json);
     }
     if (route->flags & PEN_ROUTE_PAGED) {
@@ -231,6 +263,21 @@ static void write_parameters(
             "{\"name\":\"after\",\"in\":\"query\",\"description\":\"The last "
             "id of the page before.\",\"schema\":{\"$ref\":\"" SCHEMA "Id\"}}");
     }
+    if (route->flags & PEN_ROUTE_STATES)
+        pen_json_raw(json, NULL,
+            "{\"name\":\"state\",\"in\":\"query\",\"schema\":{\"$ref\":\"" SCHEMA
+            "Job/properties/state\"}}");
+    if (route->flags & PEN_ROUTE_ASYNC)
+        pen_json_raw(json, NULL,
+            "{\"name\":\"Prefer\",\"in\":\"header\",\"description\":\"respond-async: a job, "
+            "whatever deadline_ms says. Not followed where the answer depends on the caller's "
+            "waiting: auto, sessions, answers that get "
+            "better.\",\"schema\":{\"type\":\"string\"}}");
+    if (route->flags & PEN_ROUTE_KEYED)
+        pen_json_raw(json, NULL,
+            "{\"name\":\"Idempotency-Key\",\"in\":\"header\",\"description\":\"1 to 255 "
+            "characters of your own. The same request with it again makes no second job; another "
+            "one is refused with 422.\",\"schema\":{\"type\":\"string\"}}");
     if (route->flags & PEN_ROUTE_ENTRY)
         pen_json_raw(json, NULL,
             "{\"name\":\"entry\",\"in\":\"query\",\"description\":\"The .glb or .gltf that is "
@@ -259,14 +306,19 @@ static void write_operation(
         pen_json_end(json);
     }
     pen_json_object(json, "responses");
-    if (route->gives == PEN_BODY_NONE)
+    if (route->gives == PEN_BODY_NONE || route->flags & PEN_ROUTE_REMOVES)
         write_response(json, "204", "Done.", PEN_BODY_NONE);
-    else
+    if (route->flags & (PEN_ROUTE_ASYNC | PEN_ROUTE_JOB))
+        write_response(
+            json, "202", "Accepted; Location says where it can be watched.", PEN_BODY_Job);
+    if (route->gives != PEN_BODY_NONE && !(route->flags & PEN_ROUTE_JOB))
         write_response(json, "200",
             route->flags & PEN_ROUTE_CREATES ? "These bytes are stored already." : "The answer.",
             route->gives);
     if (route->flags & PEN_ROUTE_CREATES)
         write_response(json, "201", "Stored; Location says where.", route->gives);
+    if (route->flags & PEN_ROUTE_RANGES)
+        write_response(json, "206", "The bytes that Range names.", route->gives);
     if (route->flags & PEN_ROUTE_CONDITIONAL)
         write_response(json, "304", "If-None-Match names what this request gives.", PEN_BODY_NONE);
     write_ref(json, "default", "#/components/responses/Problem");

@@ -1,4 +1,5 @@
 #include "protocol/openapi_schema.h"
+#include "protocol/json_sequence.h"
 #include "protocol/result.h"
 #include <stdio.h>
 #include <string.h>
@@ -338,6 +339,46 @@ static void write_compare(struct pen_json *json, const struct pen_catalogue *cat
     write_row_refs(json, pen_request_table());
     write_row_refs(json, pen_delivery_table());
     close_object(json);
+}
+
+static void write_sequence(struct pen_json *json, const struct pen_catalogue *catalogue)
+{
+    (void)catalogue;
+    static const char *const required[] = {"scene", NULL};
+    open_object(json, "SequenceRequest",
+        "A render request for many views of a scene. Every frame is the image that a request for "
+        "its view alone gives; of lights that move, exposure_ev and sky_level are measured with "
+        "the "
+        "first frame where they are left out. With animation, a frame is 1/fps s after the one "
+        "before. deadline_ms, on_deadline, priority, progressive and session say nothing here.");
+    write_ref(json, "scene", SCHEMA "Id");
+    open_object(json, "sequence",
+        "turntable, views and keyframes exclude each other; without "
+        "any of them the camera stands still.");
+    write_rows(json, pen_sequence_table());
+    open_object(json, "turntable", "Around the centre of the bounds, in even steps.");
+    write_rows(json, pen_turntable_table());
+    close_object(json);
+    pen_json_raw(json, "views",
+        "{\"type\":\"array\",\"minItems\":1,\"maxItems\":10000,\"items\":{\"$ref\":\"" SCHEMA
+        "Camera\"}}");
+    pen_json_raw(json, "keyframes",
+        "{\"type\":\"array\",\"minItems\":1,\"maxItems\":256,\"description\":\"In order. Cameras "
+        "have an eye, or are in orbit; the lights are as many and of the same types in all. Before "
+        "the first keyframe and after the last nothing moves.\",\"items\":{\"type\":\"object\","
+        "\"required\":[\"frame\"],\"additionalProperties\":false,\"properties\":{\"frame\":{"
+        "\"type\":\"integer\",\"minimum\":0,\"maximum\":9999},\"camera\":{\"$ref\":\"" SCHEMA
+        "Camera\"},\"lights\":{\"$ref\":\"" SCHEMA "RenderRequest/properties/lights\"}}}}");
+    close_object(json);
+    write_ref(json, "technique", SCHEMA "Technique");
+    write_ref(json, "camera", SCHEMA "Camera");
+    write_ref(json, "lights", SCHEMA "RenderRequest/properties/lights");
+    write_row_refs(json, pen_request_table());
+    write_ref(json, "output", SCHEMA "Output");
+    write_row_refs(json, pen_delivery_table());
+    pen_json_end(json);
+    write_strings(json, "required", required);
+    pen_json_end(json);
 }
 
 static void write_stage_times(struct pen_json *json, const struct pen_catalogue *catalogue)

@@ -1,6 +1,7 @@
 #include "protocol/routes.h"
 #include "protocol/request.h"
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 
@@ -30,6 +31,13 @@ static bool capture(
             return false;
         memcpy(text, token, bytes);
         return pen_id_from_hex(text, match->id);
+    }
+    if (!strncmp(placeholder, "{number}", 8)) {
+        if (!bytes || bytes > 9 || strspn(token, "0123456789") < bytes ||
+            (bytes > 1 && *token == '0'))
+            return false;
+        match->number = (uint32_t)strtoul(token, NULL, 10);
+        return true;
     }
     if (!bytes || bytes >= sizeof match->name ||
         strspn(token, "abcdefghijklmnopqrstuvwxyz0123456789-") < bytes)

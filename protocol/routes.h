@@ -24,6 +24,9 @@ enum pen_body {
     PEN_BODY_PICTURE,  /* an image */
     PEN_BODY_RENDERED, /* a rendered image, its record, or either as it gets better */
     PEN_BODY_PAGE,     /* HTML */
+    PEN_BODY_EVENTS,   /* what becomes of a job */
+    PEN_BODY_FRAME,    /* an image, or the request that gives it */
+    PEN_BODY_RESULT,   /* all that a job gives */
 };
 /* The media types of an upload, ended by NULL; NULL: the body is no upload. */
 const char *const *pen_upload_types(enum pen_body body);
@@ -36,16 +39,23 @@ enum pen_route_flags {
     PEN_ROUTE_OPEN = 16,       /* asks for no token */
     PEN_ROUTE_ENTRY = 32,      /* takes entry, the scene that is wanted of several */
     PEN_ROUTE_NAMED = 64,      /* a scene file's name may follow, which says nothing more */
+    PEN_ROUTE_ASYNC = 128,     /* Prefer: respond-async makes it a job */
+    PEN_ROUTE_JOB = 256,       /* always makes a job */
+    PEN_ROUTE_RANGES = 512,    /* Range */
+    PEN_ROUTE_REMOVES = 1024,  /* 204 where nothing is left of it */
+    PEN_ROUTE_STATES = 2048,   /* takes state */
+    PEN_ROUTE_KEYED = 4096,    /* takes Idempotency-Key */
 };
 
 struct pen_route {
     uint32_t id;         /* enum pen_route_id; the row's index */
     const char *method;  /* "GET" also serves HEAD */
-    const char *pattern; /* "{id}" is 64 lower-case hexadecimal digits, "{name}" a method's name */
+    const char *pattern; /* "{id}" is 64 lower-case hexadecimal digits, "{name}" a method's name,
+                            "{number}" a whole number */
     const char *operation;
     const char *summary;
     uint8_t takes, gives; /* enum pen_body */
-    uint8_t flags;        /* enum pen_route_flags */
+    uint16_t flags;       /* enum pen_route_flags */
 };
 extern const struct pen_route pen_routes[PEN_ROUTES];
 
@@ -53,6 +63,7 @@ struct pen_route_match {
     const struct pen_route *route;       /* NULL: none */
     uint8_t id[PEN_ID_BYTES];            /* what stood for {id} */
     char name[PEN_TECHNIQUE_NAME_BYTES]; /* what stood for {name}, or "" */
+    uint32_t number;                     /* what stood for {number} */
     uint64_t methods;                    /* bit r: row r has this path, whatever its method */
 };
 

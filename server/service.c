@@ -224,6 +224,36 @@ static bool start_pool(struct service *s, struct pen_error *error)
     return true;
 }
 
+static bool read_device(void *context, struct pen_device_info *device)
+{
+    struct service *s = context;
+    struct worker_pool_numbers numbers;
+    worker_pool_read(s->pool, &numbers);
+    *device = numbers.device;
+    return numbers.has_device;
+}
+
+static void start_jobs(struct service *s)
+{
+    const struct config *c = s->config;
+    uint32_t in_flight = (uint32_t)(c->queue_limit / 4);
+    struct jobs_config config = {.store = c->store,
+        .scheduler = s->scheduler,
+        .cache = s->cache,
+        .makers = {s->catalogue, AUTO_NAME},
+        .limits = {.active = (uint32_t)c->jobs,
+            .active_per_client = (uint32_t)c->jobs_share,
+            .kept = (uint32_t)c->jobs_kept,
+            .kept_per_client = (uint32_t)(c->jobs_kept + 3) / 4,
+            .bytes = c->jobs_limit.bytes},
+        .workers = (uint32_t)c->workers,
+        .in_flight = in_flight ? in_flight : 1,
+        .keep_s = c->jobs_keep_s,
+        .read_device = read_device,
+        .context = s};
+    s->jobs = jobs_create(&config);
+}
+
 static bool start_listeners(struct service *s, struct pen_error *error)
 {
     const struct config *c = s->config;
@@ -293,7 +323,10 @@ struct service *service_create(
     s->part_cache = result_cache_create(PART_CACHE_BYTES);
     s->scheduler = scheduler_create(&limits, on_work, s);
     s->auto_runs = auto_runs_create(&(struct auto_parts){s->scheduler, s->store, catalogue});
-    if (!start_importer(s, error) || !start_pool(s, error) || !start_listeners(s, error))
+    if (!start_importer(s, error) || !start_pool(s, error))
+        goto fail;
+    start_jobs(s);
+    if (!start_listeners(s, error))
         goto fail;
     return s;
 fail:
@@ -313,6 +346,7 @@ static void drain(struct service *s, const bool *hurry)
     __atomic_store_n(&s->draining, true, __ATOMIC_RELEASE);
     if (s->listener)
         http_listener_drain(s->listener);
+    jobs_drain(s->jobs);
     uint64_t end = clock_now_ns() + s->config->drain_timeout_ms * CLOCK_MS, quiet = 0;
     while (clock_now_ns() < end && !__atomic_load_n(hurry, __ATOMIC_ACQUIRE)) {
         uint64_t now = clock_now_ns();
@@ -351,6 +385,7 @@ void service_destroy(struct service *s, const bool *hurry)
         scheduler_cancel(s->scheduler);
     http_listener_destroy(s->listener);
     http_listener_destroy(s->admin);
+    jobs_destroy(s->jobs);
     worker_pool_destroy(s->pool);
     importer_destroy(s->importer); /* the pool's threads may still have asked for imports */
     scheduler_destroy(s->scheduler);

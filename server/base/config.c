@@ -65,6 +65,16 @@ static const struct row rows[] = {
     ROW(scrub_s, "86400", .form = "SECONDS", .max = 31536000,
         .help = "How often all that is stored is read and checked, in idle time; 0: never."),
     ROW(result_cache, "256M", SIZE, .help = "Memory for encoded images; 0: keep none."),
+    ROW(jobs, "256", .min = 1, .max = 10000, .help = "Jobs under way; beyond it 503."),
+    ROW(jobs_share, "16", .min = 1, .max = 10000,
+        .help = "Jobs that one client may have under way; beyond it 429."),
+    ROW(jobs_kept, "10000", .min = 1, .max = 1000000,
+        .help = "Jobs under way and over; beyond it 503, and 429 for a client who has a quarter."),
+    ROW(jobs_keep_s, "86400", .form = "SECONDS", .min = 1, .max = 31536000,
+        .help = "How long a job that is over is kept with its results, and Idempotency-Keys."),
+    ROW(jobs_limit, "8G", SIZE, .min = 1,
+        .help = "Room for the results of jobs; beyond it new jobs get 503, and those under way "
+                "fail."),
     ROW(hang_timeout_ms, "60000", TIME,
         .help = "A worker that has work and gives no sign of life for so long is replaced, or "
                 "sooner (10 s) when that is far longer than it ever took."),

@@ -32,6 +32,8 @@ struct config {
     uint64_t workers;
     uint64_t queue_limit, client_share;
     config_size result_cache;
+    uint64_t jobs, jobs_share, jobs_kept, jobs_keep_s;
+    config_size jobs_limit;
     uint64_t hang_timeout_ms, silence_timeout_ms, canary_interval_ms, quarantine_s, scrub_s;
     uint64_t connections, connections_per_address, http_threads;
     uint64_t header_timeout_ms, keep_alive_ms;

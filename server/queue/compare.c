@@ -27,7 +27,7 @@ static bool submit(struct compare *c, struct pen_error *error)
     uint8_t key[PEN_ID_BYTES];
     picture_key(request, key);
     c->waiter.client = c->at ? 0 : c->plan.client;
-    c->waiter.payer = c->plan.client;
+    c->waiter.payer = c->plan.payer ? c->plan.payer : c->plan.client;
     c->waiter.deadline_ns =
         c->plan.deadline_ns ? c->plan.deadline_ns : clock_now_ns() + c->plan.patience_ms * CLOCK_MS;
     c->waiter.measure = c->plan.measures ? c->plan.measures[c->at]

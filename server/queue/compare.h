@@ -11,6 +11,7 @@ struct compare_plan {
     const uint32_t *measures;           /* enum measure, one per request, the first a reference;
                                  NULL: the others are MEASURE_COMPARED */
     uint64_t client;                    /* whose share it uses, as one render; 0: nobody's */
+    uint64_t payer;                     /* whose time it takes; 0: the client's */
     uint64_t deadline_ns;               /* of all together; 0: patience_ms for each */
     uint32_t patience_ms;
     /* Called before every request but the first; false leaves it out. May be NULL. */

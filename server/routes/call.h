@@ -42,6 +42,8 @@ struct call {
     struct call_note note;
 };
 
+/* Whose the jobs are that it asks for and about: the same after a restart. */
+uint64_t call_owner(const struct call *call);
 /* Runs steps from `first` on until one ends the row. False: one has failed, with its error. */
 bool call_run(struct call *call, const struct step *first, struct pen_error *error);
 /* Goes on with the step behind the one that waited, or answers with `failure` (NULL, PEN_OK: there

@@ -1,30 +1,18 @@
 /* Methods against a reference. */
 #include "server/queue/compare.h"
 #include "protocol/json_compare.h"
-#include "protocol/memory.h"
 #include "server/auto/choice.h"
 #include "server/base/clock.h"
+#include "server/jobs/compared.h"
 #include "server/routes/routes.h"
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
-
-#define LINK_BYTES (PEN_ID_HEX + 16)
 
 struct comparing {
     struct pen_compare asked;
     struct compare *compare; /* when it is done */
     bool holds_share;
 };
-
-/* Keeps a picture and says where; NULL when there is none or it is too large to be kept. */
-static const char *keep(struct service *s, struct picture *picture, char link[LINK_BYTES])
-{
-    if (!picture || !result_cache_put(s->cache, picture))
-        return NULL;
-    snprintf(link, LINK_BYTES, "/v1/results/%s", picture->tag);
-    return link;
-}
 
 static enum step_end read_body(struct call *call, struct pen_error *error)
 {
@@ -48,6 +36,14 @@ static enum step_end look_up(struct call *call, struct pen_error *error)
 {
     const struct comparing *work = call->work;
     return routes_check_store(call, &work->asked.requests[0], error) ? STEP_NEXT : STEP_FAILED;
+}
+
+static enum step_end hand_over(struct call *call, struct pen_error *error)
+{
+    size_t bytes;
+    const char *text = body_json(&call->body, &bytes);
+    return routes_wants_job(call) ? routes_answer_job(call, JOB_COMPARE, text, bytes, error)
+                                  : STEP_NEXT;
 }
 
 static bool is_gone(void *owner)
@@ -99,22 +95,14 @@ static enum step_end answer(struct call *call, struct pen_error *error)
     struct comparing *work = call->work;
     const struct compare_row *rows = compare_rows(work->compare);
     uint32_t count = 1 + work->asked.count;
-    struct pen_compared *out = pen_alloc_zero(count, sizeof *out);
-    char(*links)[4][LINK_BYTES] = pen_alloc_zero(count, sizeof *links);
-    for (uint32_t i = 0; i < count; i++) {
-        out[i].result = &rows[i].result;
-        out[i].image = keep(s, rows[i].image, links[i][0]);
-        out[i].difference = keep(s, rows[i].maps[MEASURE_MAP_DIFFERENCE], links[i][1]);
-        out[i].ssim_map = keep(s, rows[i].maps[MEASURE_MAP_SSIM], links[i][2]);
-        out[i].flip_map = keep(s, rows[i].maps[MEASURE_MAP_FLIP], links[i][3]);
+    for (uint32_t i = 0; i < count; i++)
         for (int stage = PEN_STAGE_LOAD; stage < PEN_STAGES; stage++)
             call->note.render_ms += rows[i].result.stage_ms[stage];
-    }
-    double total_ms = clock_ms(clock_now_ns() - call->exchange->body_ns);
-    char *text =
-        pen_compare_json(&work->asked, out, call->exchange->request_id, total_ms, s->catalogue);
-    free(links);
-    free(out);
+    struct compared_extra extra = {.catalogue = s->catalogue,
+        .cache = s->cache,
+        .request_id = call->exchange->request_id,
+        .total_ms = clock_ms(clock_now_ns() - call->exchange->body_ns)};
+    char *text = compared_document(&work->asked, rows, &extra);
     http_add_header(call->exchange, "Cache-Control", "no-store");
     call_json(call, 200, text);
     return STEP_OVER;
@@ -130,8 +118,10 @@ static void end_comparing(struct call *call, void *given)
 
 static const struct step steps[] = {
     {"read", read_body},
-    {"look up", look_up}, /* the scene, and the images of its lights */
-    {"measure", measure}, /* waits */
+    {"look up", look_up},              /* the scene, and the images of its lights */
+    {"recall key", routes_recall_key}, /* what this was asked for before as */
+    {"hand over", hand_over},          /* to a job, when the client does not wait; answers */
+    {"measure", measure},              /* waits */
     {"answer", answer},
 };
 

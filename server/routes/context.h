@@ -6,6 +6,7 @@
 #include "server/base/metrics.h"
 #include "server/http/auth.h"
 #include "server/http/http.h"
+#include "server/jobs/jobs.h"
 #include "server/queue/scheduler.h"
 #include "server/uploads/importer.h"
 #include "server/store/scrubber.h"
@@ -26,6 +27,7 @@ struct service {
     struct result_cache *cache, *part_cache; /* pictures; those that got better since */
     struct metrics *metrics;
     struct auto_runs *auto_runs;
+    struct jobs *jobs;
     struct auth *auth; /* NULL: no token is asked for */
     struct http_listener *listener, *admin;
     char *openapi, openapi_tag[PEN_ID_HEX + 1];

@@ -105,6 +105,24 @@ static enum step_end look_up(struct call *call, struct pen_error *error)
     return routes_check_store(call, &work->request, error) ? STEP_NEXT : STEP_FAILED;
 }
 
+/* ---- a job, when the client does not wait ---- */
+
+/* What depends on the client's waiting, or on what came before it, is answered at once. */
+static enum step_end hand_over(struct call *call, struct pen_error *error)
+{
+    struct rendering *work = call->work;
+    const struct pen_catalogue *catalogue = call->service->catalogue;
+    bool waits = work->form == ACCEPT_PARTS || work->form == ACCEPT_EVENTS ||
+                 !strcmp(work->request.technique, AUTO_NAME) ||
+                 pen_request_is_stateful(&work->request, catalogue);
+    if (waits || !routes_wants_job(call))
+        return STEP_NEXT;
+    char *body = pen_request_json(&work->request, catalogue); /* as negotiated */
+    enum step_end end = routes_answer_job(call, JOB_RENDER, body, strlen(body), error);
+    free(body);
+    return end;
+}
+
 /* ---- the method, when it is left open ---- */
 
 /* The device, once a worker has told. */
@@ -358,12 +376,14 @@ static void end_rendering(struct call *call, void *given)
 }
 
 static const struct step steps[] = {
-    {"read", read_request},   /* the query or the body */
-    {"negotiate", negotiate}, /* the format, or the record, with Accept */
-    {"look up", look_up},     /* the scene, and the images of its lights */
-    {"choose", choose},       /* the method, when it is left open; may wait for measurements */
-    {"recall", recall},       /* the picture from the cache; answers when the client has it */
-    {"queue", queue},         /* else waits for a worker */
+    {"read", read_request},            /* the query or the body */
+    {"negotiate", negotiate},          /* the format, or the record, with Accept */
+    {"look up", look_up},              /* the scene, and the images of its lights */
+    {"recall key", routes_recall_key}, /* what this was asked for before as */
+    {"hand over", hand_over},          /* to a job, when the client does not wait; answers */
+    {"choose", choose}, /* the method, when it is left open; may wait for measurements */
+    {"recall", recall}, /* the picture from the cache; answers when the client has it */
+    {"queue", queue},   /* else waits for a worker */
     {"answer", answer},
 };
 

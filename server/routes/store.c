@@ -1,16 +1,12 @@
 /* Scenes and emission images: uploading, listing, describing, removing. */
-#include "protocol/json_request.h"
 #include "protocol/json_writer.h"
 #include "protocol/container.h"
-#include "server/http/query.h"
+#include "server/routes/page.h"
 #include "server/routes/routes.h"
 #include "server/store/describe.h"
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-#define DEFAULT_PAGE 50
-#define MAX_PAGE 200
 
 static const char *const kind_paths[STORE_KINDS] = {"/v1/scenes", "/v1/images"};
 
@@ -110,44 +106,16 @@ bool route_image_put(struct call *call, struct pen_error *error)
 
 /* ---- lists ---- */
 
-/* limit and after. */
-static bool read_page(struct call *call, uint32_t *limit, uint8_t after[PEN_ID_BYTES],
-    bool *has_after, struct pen_error *error)
-{
-    struct pen_query_pair pairs[HTTP_MAX_PAIRS];
-    uint32_t count;
-    if (!http_split_query(call->exchange->query, pairs, &count, error))
-        return false;
-    for (uint32_t i = 0; i < count; i++) {
-        const char *value = pairs[i].value ? pairs[i].value : "";
-        if (!strcmp(pairs[i].key, "limit")) {
-            char *end;
-            unsigned long n = strtoul(value, &end, 10);
-            if (*value < '0' || *value > '9' || *end || n < 1 || n > MAX_PAGE)
-                return pen_fail(error, PEN_INVALID, "/limit",
-                    "limit must be a whole number from 1 to %d.", MAX_PAGE);
-            *limit = (uint32_t)n;
-        } else if (!strcmp(pairs[i].key, "after")) {
-            if (!(*has_after = pen_id_from_hex(value, after)))
-                return pen_fail(error, PEN_INVALID, "/after", "after must be an id.");
-        } else {
-            return pen_fail(error, PEN_INVALID, "", "A list takes only the keys limit and after.");
-        }
-    }
-    return true;
-}
-
 static bool list(struct call *call, enum store_kind kind, const char *key, struct pen_error *error)
 {
     struct scene_store *store = call->service->store;
-    uint32_t limit = DEFAULT_PAGE;
-    uint8_t after[PEN_ID_BYTES];
-    bool has_after = false;
-    if (!read_page(call, &limit, after, &has_after, error))
+    struct page page;
+    if (!page_read(call, NULL, &page, error))
         return false;
-    struct store_entry entries[MAX_PAGE + 1];
-    uint32_t count = scene_store_list(store, kind, has_after ? after : NULL, entries, limit + 1);
-    uint32_t shown = count > limit ? limit : count;
+    struct store_entry entries[PAGE_MOST + 1];
+    uint32_t count =
+        scene_store_list(store, kind, page.has_after ? page.after : NULL, entries, page.limit + 1);
+    uint32_t shown = count > page.limit ? page.limit : count;
     struct pen_json json = {0};
     pen_json_object(&json, NULL);
     pen_json_array(&json, key);
@@ -160,12 +128,8 @@ static bool list(struct call *call, enum store_kind kind, const char *key, struc
     }
     pen_json_end(&json);
     pen_json_uint(&json, "total", scene_store_count(store, kind));
-    if (count > limit) {
-        char next[PEN_ID_HEX + 64], hex[PEN_ID_HEX + 1];
-        pen_id_to_hex(entries[limit - 1].id, hex);
-        snprintf(next, sizeof next, "%s?limit=%u&after=%s", kind_paths[kind], limit, hex);
-        pen_json_string(&json, "next", next);
-    }
+    if (count > shown)
+        page_write_next(&json, kind_paths[kind], NULL, &page, entries[shown - 1].id);
     pen_json_end(&json);
     return call_json(call, 200, pen_json_finish(&json, NULL));
 }

@@ -89,17 +89,33 @@ class Contract(unittest.TestCase):
     def test_contract_lists_every_address_it_serves(self):
         paths = self.d.get("/openapi.json").json()["paths"]
         for path, methods in paths.items():
-            url = path.replace("{id}", self.id).replace("{name}", "pcss")
+            url = path.replace("{id}", self.id).replace("{name}", "pcss").replace(
+                "{number}", "0")
             for method in methods:
                 if method in ("get", "head"):
                     self.assertLess(self.d.call(method.upper(), url).status, 500, url)
+
+    def test_jobs(self):
+        headers = {"Content-Type": "application/json", "Idempotency-Key": "a-sequence"}
+        body = json.dumps({"scene": self.id, **SMALL, "sequence": {"frames": 2}})
+        answer = self.d.call("POST", "/v1/jobs", body, headers)
+        self.assertEqual(answer.status, 202, answer.body)
+        links = answer.json()["links"]
+        self.assertEqual(answer.headers["Location"], links["self"])
+        events = self.d.get(links["events"])  # until the job is over
+        self.assertEqual(events.status, 200)
+        self.assertEqual(self.d.get(links["self"]).json()["state"], "successful")
+        self.assertEqual(self.d.get(links["frames"] + "/1").status, 200)
+        self.assertEqual(self.d.get(links["self"] + "/result", Range="bytes=0-9").status, 206)
+        self.assertEqual(len(self.d.get("/v1/jobs").json()["jobs"]), 1)
+        self.assertEqual(self.d.call("DELETE", links["self"]).status, 204)
 
     # ---- addresses ----
 
     def test_no_such_address(self):
         for path in ("/v2", "/v1/", "//v1", "/v1/../v1", "/v1/%2e%2e/etc", "/v1%00", "/V1",
                      "/v1/scenes/" + self.id.upper(), "/v1/scenes/" + self.id[:-1],
-                     "/v1/scenes/%s/" % self.id, "/v1/scenes/../../etc/passwd", "/v1/jobs",
+                     "/v1/scenes/%s/" % self.id, "/v1/scenes/../../etc/passwd", "/v1/jobs/",
                      "/%76%31", "/v1/scenes/%s/render/x" % self.id):
             self.problem(self.d.get(path), 404)
         self.problem(self.d.get("/v1/scenes/" + "0" * 64), 404)

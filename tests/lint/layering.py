@@ -42,7 +42,8 @@ RULES = [
       "renderer/blob/pscene.h", "renderer/blob/builder.h", "renderer/import/import_process.h",
       "renderer/import/bundle.h", "renderer/import/names.h", "renderer/generate/generate.h",
       "renderer/metrics/*.h", "renderer/trace/*.h"],
-     ["cjson/cJSON.h", "microhttpd.h", "openssl/*", "zlib.h", "seccomp.h", "isa-l.h", "isa-l/*"],
+     ["cjson/cJSON.h", "microhttpd.h", "openssl/*", "zlib.h", "seccomp.h", "isa-l.h", "isa-l/*", "sqlite3.h",
+      "webp/mux.h", "zip.h"],
      "sockets"),
     (r"clients/.*",
      ["protocol/*", "clients/*", "renderer/generate/generate.h", "renderer/blob/pscene.h",
@@ -53,7 +54,7 @@ RULES = [
 # ending) in it. A file may include what lies in its own folder or on a floor below, not its
 # neighbours on the same floor.
 FLOORS = {
-    "server": [["base"], ["http", "store", "pages"], ["queue", "uploads"], ["workers"], ["auto"], ["routes"],
+    "server": [["base"], ["http", "store", "pages"], ["queue", "uploads"], ["workers"], ["auto", "jobs/store"], ["jobs"], ["routes"],
                [""]],
     "renderer": [
         ["device", "picture", "shared", "shaders/*", "metrics", "catalogue/catalogue"],

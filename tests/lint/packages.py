@@ -15,6 +15,7 @@ CMAKE = {
     "libcjson": "libcjson-dev", "cjson": "libcjson-dev", "openexr": "libopenexr-dev",
     "libtiff-4": "libtiff-dev",
     "libisal": "libisal-dev", "libwebp": "libwebp-dev", "libwebpdecoder": "libwebp-dev",
+    "libwebpmux": "libwebp-dev", "sqlite3": "libsqlite3-dev",
     "spng": "libspng-dev", "libspng": "libspng-dev", "libutf8proc": "libutf8proc-dev",
     "draco": "libdraco-dev", "draco/compression/decode.h": "libdraco-dev",
     "libturbojpeg": "libturbojpeg0-dev", "turbojpeg": "libturbojpeg0-dev",
@@ -37,7 +38,7 @@ HEADERS = {
     "isa-l.h": "libisal-dev", "isa-l/*": "libisal-dev", "GL/*": "libgl-dev", "EGL/*": "libegl-dev",
     "seccomp.h": "libseccomp-dev", "zip.h": "libzip-dev", "webp/*": "libwebp-dev",
     "spng.h": "libspng-dev", "utf8proc.h": "libutf8proc-dev", "draco/*": "libdraco-dev", "turbojpeg.h": "libturbojpeg0-dev", "curl/*": "libcurl4-openssl-dev",
-    "openssl/*": "libssl-dev", "zlib.h": "zlib1g-dev",
+    "openssl/*": "libssl-dev", "zlib.h": "zlib1g-dev", "sqlite3.h": "libsqlite3-dev",
 }
 KEYWORDS = set("""REQUIRED QUIET IMPORTED_TARGET GLOBAL STATIC CONFIG MODULE COMPONENTS NO_MODULE
     NAMES HINTS PATHS PATH_SUFFIXES NO_DEFAULT_PATH DOC OPTIONAL_COMPONENTS""".split())

@@ -1,0 +1,302 @@
+"""Jobs: renders that nobody waits for, and sequences of many views."""
+import http.client
+import io
+import json
+import os
+import sqlite3
+import struct
+import time
+import unittest
+import zipfile
+
+import harness
+from harness import HEAVY, SMALL, Daemon, grid_scene, wait
+
+TINY = {"technique": {"name": "hard"}, "width": 24, "height": 16}
+ASYNC = {"Content-Type": "application/json", "Prefer": "respond-async"}
+OVER = ("successful", "failed", "dismissed")
+
+
+def post(d, path, request, **headers):
+    return d.call("POST", path, json.dumps(request),
+                  {"Content-Type": "application/json",
+                   **{k.replace("_", "-"): v for k, v in headers.items()}})
+
+
+def start(d, scene, sequence, **request):
+    answer = post(d, "/v1/jobs", {"scene": scene, **TINY, **request, "sequence": sequence})
+    assert answer.status == 202, answer.body
+    return answer.json()
+
+
+def job(d, id):
+    return d.get("/v1/jobs/" + id).json()
+
+
+def ended(d, id):
+    wait(lambda: job(d, id)["state"] in OVER, 120)
+    return job(d, id)
+
+
+def frame(d, id, number):
+    answer = d.get("/v1/jobs/%s/frames/%d" % (id, number))
+    assert answer.status == 200, answer.body
+    return answer.body
+
+
+def single(d, id, scene, number):
+    """The picture of a frame's own request, rendered by itself and anew."""
+    request = d.get("/v1/jobs/%s/frames/%d" % (id, number), Accept="application/json").json()
+    answer = d.render(scene, {**request, "deadline_ms": 300000})
+    assert answer.status == 200, answer.body
+    return answer.body
+
+
+def chunks(data):
+    """(name, bytes) of the parts of a WebP file or of one of its frames."""
+    at, found = 0, []
+    while at < len(data):
+        name, size = struct.unpack_from("<4sI", data, at)
+        found.append((name, data[at + 8:at + 8 + size]))
+        at += 8 + size + size % 2
+    return found
+
+
+def still(data):
+    return [c for c in chunks(data[12:]) if c[0] in (b"VP8 ", b"VP8L", b"ALPH")]
+
+
+def animation(data):
+    """(parts, milliseconds) of each frame."""
+    assert data[:4] == b"RIFF" and data[8:12] == b"WEBP"
+    return [([c for c in chunks(body[16:])], int.from_bytes(body[12:15], "little"))
+            for name, body in chunks(data[12:]) if name == b"ANMF"]
+
+
+class Events:
+    """A connection to a job's events."""
+
+    def __init__(self, d, id, last=None):
+        self.connection = http.client.HTTPConnection("127.0.0.1", d.port,
+                                                     timeout=60 * harness.PATIENCE)
+        headers = {} if last is None else {"Last-Event-ID": str(last)}
+        self.connection.request("GET", "/v1/jobs/%s/events" % id, None, headers)
+        self.response = self.connection.getresponse()
+
+    def __iter__(self):
+        """(id, event, data) of each, until the stream ends."""
+        event = {}
+        for line in self.response:
+            line = line.decode().rstrip("\n")
+            if line.startswith(":"):
+                continue
+            if line:
+                key, value = line.split(": ", 1)
+                event[key] = value
+            elif "data" in event:
+                yield int(event["id"]), event["event"], json.loads(event["data"])
+                event = {}
+
+    def close(self):
+        self.connection.close()
+
+
+class Jobs(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.d = Daemon("--jobs-share=64")
+        cls.scene = cls.d.upload(grid_scene(4))
+
+    @classmethod
+    def tearDownClass(cls):
+        status = cls.d.stop()
+        assert status == 0, status
+        cls.d.kill()
+
+    def problem(self, answer, status, pointer=None):
+        self.assertEqual(answer.status, status, answer.body)
+        self.assertEqual(answer.headers["Content-Type"], "application/problem+json")
+        if pointer is not None:
+            self.assertEqual(answer.json().get("pointer", ""), pointer)
+
+    # ---- one render ----
+
+    def test_render(self):
+        d, path = self.d, "/v1/scenes/%s/render" % self.scene
+        answer = post(d, path, SMALL, Prefer="respond-async, wait=1")
+        self.assertEqual(answer.status, 202)
+        self.assertEqual(answer.headers["Preference-Applied"], "respond-async")
+        document = answer.json()
+        self.assertEqual(answer.headers["Location"], "/v1/jobs/" + document["id"])
+        self.assertEqual((document["kind"], document["frames"]["total"]), ("render", 1))
+        done = ended(d, document["id"])
+        self.assertEqual((done["state"], done["progress"]), ("successful", 1))
+        self.assertEqual(done["expires_unix_s"] - done["ended_unix_s"], 86400)
+        result = d.get(done["links"]["result"])
+        self.assertEqual(result.headers["Content-Type"], "image/png")
+        self.assertEqual(result.body, d.render(self.scene, SMALL).body)
+        self.assertEqual(result.body, frame(d, document["id"], 0))
+        self.assertEqual(done["bytes"], len(result.body))
+
+    def test_accept_chooses_the_format(self):
+        answer = post(self.d, "/v1/scenes/%s/render" % self.scene, SMALL, Prefer="respond-async",
+                      Accept="image/webp")
+        done = ended(self.d, answer.json()["id"])
+        self.assertEqual(self.d.get(done["links"]["result"]).headers["Content-Type"], "image/webp")
+
+    def test_what_is_answered_at_once_all_the_same(self):
+        for request, accept in (({**SMALL, "technique": {"name": "temporal"}, "session": "a"}, None),
+                                (SMALL, "text/event-stream"), ({**SMALL, "progressive": True}, None)):
+            headers = {"Prefer": "respond-async", **({"Accept": accept} if accept else {})}
+            answer = post(self.d, "/v1/scenes/%s/render" % self.scene, request, **headers)
+            self.assertEqual(answer.status, 200)
+            self.assertNotIn("Preference-Applied", answer.headers)
+
+    def test_compare(self):
+        request = {"width": 40, "height": 30, "techniques": ["hard", "pcss"],
+                   "reference": {"name": "multisample", "params": {"samples": 16}}}
+        answer = post(self.d, "/v1/scenes/%s/compare" % self.scene, request, Prefer="respond-async")
+        self.assertEqual(answer.status, 202, answer.body)
+        done = ended(self.d, answer.json()["id"])
+        self.assertEqual(done["state"], "successful", done)
+        result = self.d.get(done["links"]["result"]).json()
+        at_once = post(self.d, "/v1/scenes/%s/compare" % self.scene,
+                       {**request, "deadline_ms": 300000}).json()
+        for a, b in zip(result["methods"], at_once["methods"]):
+            self.assertEqual(a["technique"], b["technique"])
+            self.assertEqual(a["rmse"], b["rmse"])
+            self.assertEqual(self.d.get(a["links"]["image"]).body,
+                             self.d.get(b["links"]["image"]).body)
+
+    def test_refused_like_any_request(self):
+        path = "/v1/scenes/%s/render" % self.scene
+        self.problem(post(self.d, path, {"widht": 1}, Prefer="respond-async"), 422)
+        self.problem(post(self.d, "/v1/scenes/%s/render" % ("0" * 64), SMALL,
+                          Prefer="respond-async"), 404)
+
+    # ---- sequences ----
+
+    def check_frames(self, id, count, some=None):
+        done = ended(self.d, id)
+        self.assertEqual((done["state"], done["frames"]["done"]), ("successful", count), done)
+        pictures = [frame(self.d, id, i) for i in range(count)]
+        for i in some or range(count):
+            self.assertEqual(pictures[i], single(self.d, id, self.scene, i), i)
+        return done, pictures
+
+    def test_turntable(self):
+        id = start(self.d, self.scene, {"frames": 8, "turntable": {"elevation_deg": 20}})["id"]
+        done, pictures = self.check_frames(id, 8)
+        for i in (0, 3, 7):  # and as anybody would ask for the view
+            answer = self.d.render(self.scene, {**TINY, "camera": {"orbit": {
+                "azimuth_deg": 45 * i - (360 if i > 4 else 0), "elevation_deg": 20}}})
+            self.assertEqual(answer.body, pictures[i], i)
+        self.assertGreater(len(set(pictures)), 1)
+        result = self.d.get(done["links"]["result"])
+        self.assertEqual(result.headers["Content-Type"], "application/zip")
+        with zipfile.ZipFile(io.BytesIO(result.body)) as archive:
+            self.assertEqual(archive.namelist(), ["%06d.png" % i for i in range(8)])
+            self.assertEqual([archive.read(n) for n in archive.namelist()], pictures)
+        self.assertEqual(done["bytes"], sum(map(len, pictures)) + len(result.body))
+
+    def test_views(self):
+        cameras = [{"eye": [2, 1 + 0.2 * i, 2], "target": [0, 0.3, 0]} for i in range(3)]
+        id = start(self.d, self.scene, {"views": cameras, "archive": "none"})["id"]
+        done, pictures = self.check_frames(id, 3)
+        self.assertNotIn("result", done["links"])
+        for camera, picture in zip(cameras, pictures):
+            self.assertEqual(self.d.render(self.scene, {**TINY, "camera": camera}).body, picture)
+
+    def test_keyframes_of_the_camera(self):
+        keys = [{"frame": 0, "camera": {"eye": [2, 1, 2]}}, {"frame": 4, "camera": {"eye": [-2, 2, 2]}}]
+        id = start(self.d, self.scene, {"keyframes": keys})["id"]
+        pictures = self.check_frames(id, 5)[1]
+        middle = self.d.render(self.scene, {**TINY, "camera": {"eye": [0, 1.5, 2]}})
+        self.assertEqual(middle.body, pictures[2])
+
+    def test_lights_that_move_keep_the_exposure_of_the_first_frame(self):
+        light = lambda x: [{"type": "rect", "position": [x, 3, 1], "power_w": 40 + 30 * x}]
+        keys = [{"frame": 0, "lights": light(0)}, {"frame": 3, "lights": light(3)}]
+        id = start(self.d, self.scene, {"keyframes": keys}, technique="pcss")["id"]
+        pictures = self.check_frames(id, 4)[1]
+        requests = [self.d.get("/v1/jobs/%s/frames/%d" % (id, i), Accept="application/json").json()
+                    for i in range(4)]
+        self.assertEqual(len({r["exposure_ev"] for r in requests}), 1)
+        self.assertEqual(len({r["sky_level"] for r in requests}), 1)
+        self.assertEqual([r["lights"][0]["power_w"] for r in requests], [40, 70, 100, 130])
+        open_request = {**TINY, "technique": "pcss", "lights": light(0)}
+        self.assertEqual(self.d.render(self.scene, open_request).body, pictures[0])
+
+    def test_exr_and_webp(self):
+        id = start(self.d, self.scene, {"frames": 2}, output={"format": "exr", "layer": "depth"})["id"]
+        self.assertTrue(all(p[:4] == b"\x76\x2f\x31\x01" for p in self.check_frames(id, 2)[1]))
+        id = start(self.d, self.scene, {"frames": 7, "fps": 30, "archive": "webp", "turntable": {}},
+                   output={"format": "webp"})["id"]
+        done, pictures = self.check_frames(id, 7)
+        result = self.d.get(done["links"]["result"])
+        self.assertEqual(result.headers["Content-Type"], "image/webp")
+        self.assertEqual(animation(result.body), [
+            (stills, 33 + (i in (1, 4))) for i, stills in enumerate(map(still, pictures))])
+
+    def test_sequence_refused(self):
+        refuse = lambda pointer, sequence, status=422, **request: self.problem(
+            post(self.d, "/v1/jobs", {"scene": self.scene, **TINY, **request, "sequence": sequence}),
+            status, pointer)
+        refuse("/sequence/frames", {"frames": 10001})
+        refuse("/sequence/frame", {"frame": 1})
+        refuse("/sequence", {"turntable": {}, "views": [{}]})
+        refuse("/sequence/turntable/turns", {"turntable": {"turns": 1e9}})
+        refuse("/sequence/views/1/eye", {"views": [{}, {"eye": [1, 2]}]})
+        refuse("/sequence/keyframes/1", {"keyframes": [{"frame": 1, "camera": {"eye": [1, 1, 1]}},
+                                                       {"frame": 1, "camera": {"eye": [1, 1, 2]}}]})
+        refuse("/sequence/keyframes/0/camera/index", {"keyframes": [{"frame": 0, "camera": {"index": -1}}]})
+        refuse("/sequence/keyframes/0", {"keyframes": [{"frame": 0, "camera": {"index": 0}}]})
+        refuse("/sequence/archive", {"archive": "webp"})
+        refuse("/technique", {}, technique="auto")
+        refuse("/camera", {"turntable": {}}, camera={"eye": [1, 1, 1]})
+        # The eye meets the target half way.
+        refuse("/sequence", {"keyframes": [{"frame": 0, "camera": {"eye": [0, 1, 1], "target": [0, 1, 0]}},
+                                           {"frame": 2, "camera": {"eye": [0, 1, -1], "target": [0, 1, 0]}}]})
+        self.problem(post(self.d, "/v1/jobs", {**TINY}), 422, "/scene")
+        self.problem(post(self.d, "/v1/jobs", {**TINY, "scene": "0" * 64}), 404)
+        self.problem(self.d.call("POST", "/v1/jobs?a=1", "{}", ASYNC), 400)
+
+    # ---- what there is ----
+
+    def test_unknown(self):
+        for rest in ("", "/events", "/frames/0", "/result"):
+            self.problem(self.d.get("/v1/jobs/%s%s" % ("0" * 64, rest)), 404)
+        self.problem(self.d.call("DELETE", "/v1/jobs/" + "0" * 64), 404)
+        for path in ("/v1/jobs/x", "/v1/jobs/%s/frames/01" % ("0" * 64),
+                     "/v1/jobs/%s/frames/-1" % ("0" * 64)):
+            self.problem(self.d.get(path), 404)
+
+    def test_list(self):
+        path = "/v1/scenes/%s/render" % self.scene
+        ids = [post(self.d, path, TINY, Prefer="respond-async").json()["id"] for _ in range(5)]
+        for id in ids:
+            ended(self.d, id)
+        found, page = [], "/v1/jobs?limit=2&state=successful"
+        while page:
+            document = self.d.get(page).json()
+            self.assertLessEqual(len(document["jobs"]), 2)
+            found += [j["id"] for j in document["jobs"]]
+            page = document.get("next")
+        self.assertEqual(len(found), document["total"])
+        self.assertEqual(found, sorted(found, reverse=True))
+        self.assertEqual([i for i in found if i in ids], ids[::-1])
+        self.assertEqual(self.d.get("/v1/jobs?state=accepted").json()["jobs"], [])
+        self.problem(self.d.get("/v1/jobs?state=lost"), 422, "/state")
+
+    def test_delete(self):
+        done = ended(self.d, post(self.d, "/v1/scenes/%s/render" % self.scene, TINY,
+                                  Prefer="respond-async").json()["id"])
+        folder = os.path.join(self.d.store, "jobs", done["id"])
+        self.assertTrue(os.path.isdir(folder))
+        self.assertEqual(self.d.call("DELETE", "/v1/jobs/" + done["id"]).status, 204)
+        self.problem(self.d.get("/v1/jobs/" + done["id"]), 404)
+        self.assertFalse(os.path.exists(folder))
+
+
+if __name__ == "__main__":
+    harness.main()

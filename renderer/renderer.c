@@ -18,6 +18,7 @@ struct pen_render {
     struct pen_renderer *renderer;
     struct lane lane;
     struct residency_share share;
+    GLenum gl_error; /* the first one in its turns */
 };
 
 struct pen_renderer {
@@ -27,7 +28,7 @@ struct pen_renderer {
     struct residency residency;
     struct pen_render renders[PEN_MAX_RENDERS];
     const struct pen_render *advanced; /* the last one */
-    bool lost;
+    enum pen_loss loss;
     struct technique_speed speeds[TECHNIQUE_SPEEDS];
 };
 
@@ -92,11 +93,42 @@ uint64_t pen_renderer_gpu_bytes(const struct pen_renderer *r)
     return residency_bytes(&r->residency);
 }
 
+enum pen_loss pen_renderer_loss(struct pen_renderer *r)
+{
+    if (r->loss == PEN_LOSS_NONE) {
+        GLenum reset = gl.GetGraphicsResetStatus();
+        r->loss = reset == GL_NO_ERROR                 ? PEN_LOSS_NONE
+                  : reset == GL_INNOCENT_CONTEXT_RESET ? PEN_LOSS_OTHERS
+                                                       : PEN_LOSS_OWN;
+    }
+    return r->loss;
+}
+
+/* What OpenGL says now is about what was just done, for `render` (NULL: none). Returns the error. */
+static GLenum take_error(struct pen_renderer *r, struct pen_render *render)
+{
+    GLenum error = gl_take_error();
+    if (error == GL_OUT_OF_MEMORY && r->loss == PEN_LOSS_NONE)
+        r->loss = PEN_LOSS_MEMORY;
+    else if (error == GL_CONTEXT_LOST && pen_renderer_loss(r) == PEN_LOSS_NONE)
+        r->loss = PEN_LOSS_OWN;
+    if (render && error != GL_NO_ERROR && render->gl_error == GL_NO_ERROR)
+        render->gl_error = error;
+    return error;
+}
+
 bool pen_renderer_load_scene(
     struct pen_renderer *r, const uint8_t id[PEN_ID_BYTES], int fd, struct pen_error *error)
 {
     pen_renderer_drop_views(r); /* a scene of this id may have been another */
-    return residency_load(&r->residency, id, fd, error);
+    if (!residency_load(&r->residency, id, fd, error))
+        return false;
+    GLenum gl_error = take_error(r, NULL);
+    if (gl_error == GL_NO_ERROR)
+        return true;
+    residency_drop(&r->residency, id);
+    return pen_fail(
+        error, PEN_INTERNAL, "", "Loading the scene, OpenGL reported error 0x%04x.", gl_error);
 }
 
 bool pen_renderer_has_scene(const struct pen_renderer *r, const uint8_t id[PEN_ID_BYTES])
@@ -278,6 +310,7 @@ struct pen_render *pen_render_begin(struct pen_renderer *r, const struct pen_req
         .emissions = r->residency.emissions,
         .find_image = find_image,
         .owner = r};
+    render->gl_error = GL_NO_ERROR;
     render->share.need = picture_bytes(r, request);
     if (technique_registry[t]->info.keeps_history)
         lane->job.history = history_open(r->ctx.histories, lane->ctx.lane, request);
@@ -318,6 +351,7 @@ bool pen_render_advance(struct pen_render *render, double ms)
     r->advanced = render;
     r->residency.drawing = &render->share;
     bool ended = lane_advance(&render->lane, ms);
+    take_error(r, render);
     r->residency.drawing = NULL;
     return ended;
 }
@@ -362,13 +396,11 @@ bool pen_render_end(struct pen_render *render, struct pen_error *error)
     residency_make_room(&r->residency, 0, lane->job.scene); /* what the lane keeps may go, too */
     result->gpu_bytes = pen_renderer_gpu_bytes(r);
     result->programs = gl_programs_counts(r->ctx.programs);
-    GLenum gl_error = gl.GetError();
-    if (ok && gl_error == GL_NO_ERROR)
+    take_error(r, render);
+    if (ok && render->gl_error == GL_NO_ERROR)
         return true;
-    if (gl_error == GL_CONTEXT_LOST || gl_error == GL_OUT_OF_MEMORY)
-        r->lost = true;
     if (ok)
-        pen_fail(&failure, PEN_INTERNAL, "", "OpenGL reported error 0x%04x.", gl_error);
+        pen_fail(&failure, PEN_INTERNAL, "", "OpenGL reported error 0x%04x.", render->gl_error);
     pen_frame_finish(frame);
     result->error = failure;
     if (error)
@@ -402,9 +434,4 @@ void pen_renderer_drop_views(struct pen_renderer *r)
 bool pen_renderer_is_called(const struct pen_renderer *r)
 {
     return r->ctx.is_called && r->ctx.is_called(r->ctx.call_context);
-}
-
-bool pen_renderer_is_lost(struct pen_renderer *r)
-{
-    return r->lost || gl.GetGraphicsResetStatus() != GL_NO_ERROR;
 }

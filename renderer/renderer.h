@@ -89,8 +89,14 @@ void pen_renderer_drop_shadows(struct pen_renderer *renderer);
 void pen_renderer_drop_views(struct pen_renderer *renderer); /* the second alone */
 /* As config.is_called says; false without it. */
 bool pen_renderer_is_called(const struct pen_renderer *renderer);
-/* True when the GL context was lost; the worker then exits and is replaced. */
-bool pen_renderer_is_lost(struct pen_renderer *renderer);
+/* Why nothing can be drawn any more, or relied upon: the process is then to be replaced. */
+enum pen_loss {
+    PEN_LOSS_NONE,
+    PEN_LOSS_MEMORY, /* the device had none left, whoever has it */
+    PEN_LOSS_OTHERS, /* the context, by the fault of another one */
+    PEN_LOSS_OWN     /* the context */
+};
+enum pen_loss pen_renderer_loss(struct pen_renderer *renderer);
 
 enum pen_warm_up {
     PEN_WARM_USUAL, /* what a request needs that leaves everything out */

@@ -14,6 +14,16 @@ void gl_wait(void)
     waits++;
 }
 
+GLenum gl_take_error(void)
+{
+    GLenum worst = GL_NO_ERROR, error;
+    /* A lost context may go on telling of it. */
+    for (int i = 0; i < 16 && (error = gl.GetError()) != GL_NO_ERROR; i++)
+        if (worst == GL_NO_ERROR || error == GL_OUT_OF_MEMORY || error == GL_CONTEXT_LOST)
+            worst = error;
+    return worst;
+}
+
 uint32_t gl_waits(void)
 {
     return waits;

@@ -40,6 +40,9 @@ double gl_now_ms(void); /* monotonic */
 
 /* Until all is done that was handed over to the device; and how often that was done. */
 void gl_wait(void);
+/* OpenGL's error since the last call, GL_NO_ERROR if there was none; of several that of memory or of
+ * a lost context. */
+GLenum gl_take_error(void);
 uint32_t gl_waits(void);
 
 /* How long work takes, for who cuts it: where other processes are on the processors too, not longer

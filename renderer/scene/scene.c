@@ -302,10 +302,8 @@ static void forget_areas(struct scene *s)
         s->meshlet_areas[i] = -1;
 }
 
-static struct scene *upload(struct scene *s, struct pen_error *error)
+static struct scene *upload(struct scene *s)
 {
-    while (gl.GetError() != GL_NO_ERROR)
-        ;
     s->positions = make_buffer(s, s->blob.positions, (size_t)12 * s->blob.vertex_count);
     s->attributes = make_buffer(
         s, s->blob.attributes, sizeof(struct psc_attributes) * (size_t)s->blob.vertex_count);
@@ -321,11 +319,6 @@ static struct scene *upload(struct scene *s, struct pen_error *error)
     gl.CreateBuffers(1, &s->commands);
     scene_measure(s);
     psc_rest(&s->file);
-    if (gl.GetError() != GL_NO_ERROR) {
-        pen_fail(error, PEN_INTERNAL, "", "The GPU has no memory left for this scene.");
-        scene_destroy(s);
-        return NULL;
-    }
     return s;
 }
 
@@ -352,7 +345,7 @@ static struct scene *open_file(struct scene *s, struct pen_error *error)
     }
     if (s->poses)
         s->blob = *pose_scene(s->poses);
-    return upload(s, error);
+    return upload(s);
 }
 
 struct scene *scene_create(const uint8_t id[PEN_ID_BYTES], int fd, struct pen_error *error)

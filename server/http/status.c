@@ -23,6 +23,7 @@ struct http_status http_status_of(enum pen_code code)
         ROW(FORBIDDEN, 403, "Forbidden", false);
         ROW(MISDIRECTED, 421, "Misdirected Request", false);
         ROW(TOO_MANY, 429, "Too Many Requests", true);
+        ROW(HELD_BACK, 422, "Unprocessable Content", true);
         ROW(TIMEOUT, 408, "Request Timeout", true);
         ROW(METHOD_NOT_ALLOWED, 405, "Method Not Allowed", false);
         ROW(NOT_ACCEPTABLE, 406, "Not Acceptable", false);

@@ -56,10 +56,10 @@ struct render {
     uint64_t best_until_ns; /* of a waiter who takes what there is; 0: there is none */
     bool shareable, running, batch, fresh, continues;
     uint32_t measure;
-    int reference_fd;         /* the render's own; 0: none */
-    uint32_t attempts, kills; /* kept by the worker pool */
-    char request_id[33];      /* of the one who asked first, as is: */
-    uint64_t payer;           /* whose time it takes */
+    int reference_fd;                  /* the render's own; 0: none */
+    uint32_t attempts, kills, starved; /* kept by the worker pool */
+    char request_id[33];               /* of the one who asked first, as is: */
+    uint64_t payer;                    /* whose time it takes */
     struct account *account;
     struct estimate estimate;               /* of when it was asked for */
     double following_ms, following_sure_ms; /* of what follows: likely, and at least */

@@ -135,6 +135,8 @@ static void write_service(struct service *s, struct metrics_text *text)
         {"penumbra_workers_up", "gauge", "Workers that take jobs.", pool.up},
         {"penumbra_worker_restarts_total", "counter", "Workers that ended.", pool.restarts},
         {"penumbra_worker_crashes_total", "counter", "Of these, by their own fault.", pool.crashes},
+        {"penumbra_worker_out_of_memory_total", "counter",
+            "Of these, because the device had no memory left.", pool.starved},
         {"penumbra_worker_hangs_total", "counter", "Of these, by the watchdog.", pool.hangs},
         {"penumbra_renders_cancelled_total", "counter",
             "Renders that were given up because nobody waited for them any more.", pool.cancelled},

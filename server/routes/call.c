@@ -44,7 +44,8 @@ static void answer_problem(struct call *call, const struct pen_error *error)
 {
     struct http_exchange *x = call->exchange;
     struct http_status told = http_status_of((enum pen_code)error->code);
-    if (error->code == PEN_UNAVAILABLE || error->code == PEN_TOO_MANY)
+    if (error->code == PEN_UNAVAILABLE || error->code == PEN_TOO_MANY ||
+        error->code == PEN_HELD_BACK)
         http_add_header(x, "Retry-After", "%u", error->retry_after_s ? error->retry_after_s : 1);
     if (error->code == PEN_UNAUTHORIZED)
         http_add_header(x, "WWW-Authenticate", "Bearer");

@@ -91,12 +91,20 @@ bool routes_check_store(
             !scene_store_find(s->store, STORE_IMAGES, light->image, NULL))
             return pen_fail(error, PEN_INVALID, pointer, "There is no such image.");
     }
-    uint32_t refused_s = worker_pool_quarantine_s(s->pool, request->scene);
-    if (refused_s)
-        return pen_fail(error, PEN_INVALID, "",
-            "Rendering this scene ended the renderer twice: it is refused for %u more seconds.",
-            refused_s);
-    return true;
+    uint32_t held_s;
+    enum quarantined held = worker_pool_quarantined(s->pool, request, &held_s);
+    if (!held)
+        return true;
+    pen_fail(error, PEN_HELD_BACK, "",
+        held == QUARANTINE_SCENE
+            ? "Rendering this scene ended the renderer several times: it is refused for %u more "
+              "seconds."
+            : "Rendering this scene with this method at this size ended the renderer twice: that "
+              "is "
+              "refused for %u more seconds. Other methods or sizes may do.",
+        held_s);
+    error->retry_after_s = held_s;
+    return false;
 }
 
 static enum step_end look_up(struct call *call, struct pen_error *error)

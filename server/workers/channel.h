@@ -21,6 +21,15 @@ enum worker_warm_up {
     WORKER_WARM_UP_FILL_NOW
 };
 
+/* How a worker ends that cannot go on; what it had in hand is for another one. */
+enum worker_exit {
+    WORKER_EXIT_REFUSED = 2, /* it has said why */
+    WORKER_EXIT_LOST,        /* the context is lost */
+    WORKER_EXIT_PROTOCOL,    /* the daemon is gone, or talks nonsense */
+    WORKER_EXIT_MEMORY,      /* the device has no memory left */
+    WORKER_EXIT_OTHERS       /* the context is lost by another program's fault */
+};
+
 enum channel_kind {
     CHANNEL_HELLO = 1, /* worker: the context stands */
     CHANNEL_REFUSED,   /* worker: there is no such device; it then exits */

@@ -1,13 +1,17 @@
-/* Scenes that ended workers. */
+/* What ended workers: requests of one scene, method and size, and, when several of them did, the
+ * scene. */
 #pragma once
-#include "protocol/limits.h"
-#include <stdbool.h>
-#include <stdint.h>
+#include "protocol/request.h"
 
 struct quarantine;
 struct quarantine *quarantine_create(uint64_t seconds);
 void quarantine_destroy(struct quarantine *quarantine);
-/* The scene ended a worker. True when this is the second time and it is refused from now on. */
-bool quarantine_blame(struct quarantine *quarantine, const uint8_t scene[PEN_ID_BYTES]);
-uint32_t quarantine_remaining_s(struct quarantine *quarantine, const uint8_t scene[PEN_ID_BYTES]);
+
+enum quarantined { QUARANTINE_NOTHING, QUARANTINE_REQUEST, QUARANTINE_SCENE };
+/* The request ended a worker. What is refused from now on, and was not before. */
+enum quarantined quarantine_blame(struct quarantine *quarantine, const struct pen_request *request);
+/* Whether it is refused; *remaining_s: for how long still. */
+enum quarantined quarantine_check(
+    struct quarantine *quarantine, const struct pen_request *request, uint32_t *remaining_s);
+/* Scenes that are refused, or of which something is. */
 uint32_t quarantine_count(struct quarantine *quarantine);

@@ -18,9 +18,6 @@
 #include <unistd.h>
 
 #define TELL_TURN_MS 250
-#define EXIT_REFUSED 2
-#define EXIT_LOST 3
-#define EXIT_PROTOCOL 4
 
 struct worker {
     struct pen_renderer *renderer;
@@ -33,7 +30,7 @@ struct worker {
 static void send_or_exit(const struct channel_message *message)
 {
     if (!channel_send(CHANNEL_WORKER_FD, message, NULL))
-        _exit(EXIT_PROTOCOL); /* the daemon is gone */
+        _exit(WORKER_EXIT_PROTOCOL); /* the daemon is gone */
 }
 
 /* A process that is stopped, frozen or starved is silent; a pass that takes long is not. */
@@ -141,7 +138,7 @@ static bool hand_over(struct worker *worker, struct worker_item *item)
 {
     struct pen_renderer *renderer = worker->renderer;
     struct pen_result *result = &item->message.result;
-    if (result->error.code != PEN_OK && pen_renderer_is_lost(renderer)) {
+    if (result->error.code != PEN_OK && pen_renderer_loss(renderer)) {
         free(item);
         return false;
     }
@@ -218,7 +215,9 @@ static bool run_turn(struct worker *worker)
         return true;
     tell_turn(worker, job);
     struct worker_item *item = worker_turns_run(worker->turns);
-    return !item || hand_over(worker, item);
+    if (!item) /* of what it has drawn since nothing could be relied upon */
+        return pen_renderer_loss(worker->renderer) == PEN_LOSS_NONE;
+    return hand_over(worker, item);
 }
 
 static void drop(struct worker *worker, const uint8_t scene[PEN_ID_BYTES])
@@ -254,7 +253,22 @@ static bool is_called(void *context)
     return poll(&watch, 1, 0) > 0;
 }
 
-/* Returns the exit status once the daemon hangs up or the context is lost. */
+static int exit_status(struct pen_renderer *renderer)
+{
+    switch (pen_renderer_loss(renderer)) {
+    case PEN_LOSS_NONE:
+        return 0;
+    case PEN_LOSS_MEMORY:
+        return WORKER_EXIT_MEMORY;
+    case PEN_LOSS_OTHERS:
+        return WORKER_EXIT_OTHERS;
+    case PEN_LOSS_OWN:
+        break;
+    }
+    return WORKER_EXIT_LOST;
+}
+
+/* Returns the exit status once the daemon hangs up or nothing can be drawn any more. */
 static int serve(struct worker *worker)
 {
     static struct channel_message message;
@@ -271,14 +285,14 @@ static int serve(struct worker *worker)
             if (got == 0 || (got < 0 && errno == ECONNRESET))
                 return 0;
             if (got < 0)
-                return EXIT_PROTOCOL;
+                return WORKER_EXIT_PROTOCOL;
             alive = take_message(worker, &message, &fds);
             channel_close_fds(&fds);
         } else {
             alive = run_turn(worker);
         }
         if (!alive)
-            return EXIT_LOST;
+            return exit_status(worker->renderer);
     }
 }
 
@@ -288,11 +302,11 @@ static int fill_cache(const struct pen_renderer_config *config, bool gives_way)
         setpriority(PRIO_PROCESS, 0, 19);
     struct pen_renderer *renderer = pen_renderer_create(config, NULL);
     if (!renderer)
-        return EXIT_REFUSED;
+        return WORKER_EXIT_REFUSED;
     pen_renderer_warm_up(renderer, PEN_WARM_ALL);
-    bool lost = pen_renderer_is_lost(renderer);
+    int status = exit_status(renderer);
     pen_renderer_destroy(renderer);
-    return lost ? EXIT_LOST : 0;
+    return status;
 }
 
 int main(int argc, char **argv)
@@ -326,7 +340,7 @@ int main(int argc, char **argv)
         hello.kind = CHANNEL_REFUSED;
         hello.refused = error;
         send_or_exit(&hello);
-        return EXIT_REFUSED;
+        return WORKER_EXIT_REFUSED;
     }
     worker.turns = worker_turns_create(worker.renderer, on_part, &worker);
     worker.encoder = worker_encoder_create(CHANNEL_WORKER_FD);
@@ -340,8 +354,8 @@ int main(int argc, char **argv)
         warm_up(&worker);
     int status = serve(&worker);
     worker_encoder_destroy(worker.encoder);
-    if (status == EXIT_LOST)
-        _exit(EXIT_LOST); /* nothing of a lost context is worth tidying */
+    if (pen_renderer_loss(worker.renderer))
+        _exit(status); /* nothing of a lost context is worth tidying */
     worker_turns_destroy(worker.turns);
     pen_renderer_destroy(worker.renderer);
     return status;

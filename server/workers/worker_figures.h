@@ -28,7 +28,7 @@ struct worker_pool_numbers {
     bool warmed;     /* a worker has been through its warm-up */
     uint32_t up;     /* workers that take jobs now */
     uint32_t silent; /* of these, whose processes stand still */
-    uint32_t restarts, crashes, hangs, retries, quarantined, cancelled;
+    uint32_t restarts, crashes, hangs, starved, retries, quarantined, cancelled;
     uint64_t gpu_bytes;
     struct pen_program_counts programs; /* of all workers, each since its start */
     double create_ms, warm_ms;          /* of the last worker that started */

@@ -19,7 +19,9 @@
 
 #define WANTED_EVERY_MS 10 /* how often it is asked whether anybody still waits for what runs */
 #define MAX_KILLS 2        /* of one render, by its own fault */
-#define MAX_ATTEMPTS 6     /* of one render, when somebody else ends the workers */
+#define STARVED_RETRY_S 10
+#define MAX_STARVED 2  /* of one render, when the device has no memory left */
+#define MAX_ATTEMPTS 6 /* of one render, when somebody else ends the workers */
 #define QUIT_MS 3000
 #define MAX_BACKOFF_MS 5000
 #define LEAST_PATIENCE_NS (10 * CLOCK_S)
@@ -125,21 +127,50 @@ static void count(struct worker_pool *pool, uint32_t *number)
     pthread_mutex_unlock(&pool->lock);
 }
 
+static void blame(struct worker_pool *pool, const struct pen_request *request)
+{
+    char scene[PEN_ID_HEX + 1];
+    pen_id_to_hex(request->scene, scene);
+    switch (quarantine_blame(pool->quarantine, request)) {
+    case QUARANTINE_REQUEST:
+        log_event(LOG_ERROR,
+            "scene %s, %.31s, %u x %u x %u ended two workers and is refused from now on", scene,
+            request->technique, request->width, request->height, request->antialias);
+        break;
+    case QUARANTINE_SCENE:
+        log_event(LOG_ERROR, "scene %s ended several workers and is refused from now on", scene);
+        break;
+    case QUARANTINE_NOTHING:
+        break;
+    }
+}
+
+/* Of what a worker has died. */
+enum death { DEATH_OWN, DEATH_OUTSIDE, DEATH_MEMORY };
+
 /* The worker died under this render: gives it back to be tried again, or gives up on it. */
-static void survive(struct slot *slot, struct flight *flight, bool guilty, bool own_fault)
+static void survive(struct slot *slot, struct flight *flight, bool guilty, enum death death)
 {
     struct worker_pool *pool = slot->pool;
     struct render *render = flight->render;
     struct outcome outcome = {0};
     render->attempts += flight->phase != PHASE_SENT;
-    render->kills += guilty && own_fault;
-    bool give_up = render->kills >= MAX_KILLS || render->attempts >= MAX_ATTEMPTS;
+    render->kills += guilty && death == DEATH_OWN;
+    render->starved += guilty && death == DEATH_MEMORY;
+    bool starved = render->starved >= MAX_STARVED;
+    bool give_up = starved || render->kills >= MAX_KILLS || render->attempts >= MAX_ATTEMPTS;
     /* For what ends workers, not for what takes them long. */
-    if (guilty && !slot->hung && (own_fault || give_up) &&
-        quarantine_blame(pool->quarantine, render->request.scene))
-        log_event(LOG_ERROR, "a scene ended two workers and is refused from now on");
+    if (guilty && death == DEATH_OWN && !slot->hung)
+        blame(pool, &render->request);
     if (is_stopping(pool)) {
         pen_fail(&outcome.error, PEN_UNAVAILABLE, "", "The service is shutting down.");
+        worker_slot_finish(slot, flight, &outcome);
+    } else if (starved) {
+        pen_fail(&outcome.error, PEN_UNAVAILABLE, "",
+            "The device ran out of memory twice while this was rendered; other programs may hold "
+            "it, "
+            "or --gpu-memory is more than it has.");
+        outcome.error.retry_after_s = STARVED_RETRY_S;
         worker_slot_finish(slot, flight, &outcome);
     } else if (give_up) {
         pen_fail(&outcome.error, PEN_INTERNAL, "", "Rendering this scene ends the renderer.");
@@ -165,6 +196,26 @@ static void log_suspect(const struct slot *slot, const struct render *render)
         at->light, at->pass);
 }
 
+static enum death find_cause(int status, bool hung)
+{
+    if (WIFSIGNALED(status) && !hung) /* no render stops a process */
+        return WTERMSIG(status) == SIGKILL || WTERMSIG(status) == SIGTERM ? DEATH_OUTSIDE
+                                                                          : DEATH_OWN;
+    if (WIFEXITED(status) && WEXITSTATUS(status) == WORKER_EXIT_OTHERS)
+        return DEATH_OUTSIDE;
+    return WIFEXITED(status) && WEXITSTATUS(status) == WORKER_EXIT_MEMORY ? DEATH_MEMORY
+                                                                          : DEATH_OWN;
+}
+
+static const char *death_text(int status, enum death death, char *text, size_t bytes)
+{
+    if (death == DEATH_MEMORY)
+        return "ended: the device has no memory left";
+    if (death == DEATH_OUTSIDE && WIFEXITED(status))
+        return "ended: another program made the device reset";
+    return process_describe(status, text, bytes);
+}
+
 /* The process has ended, or its socket has: collects it and settles what it had in hand. */
 static void bury(struct slot *slot)
 {
@@ -180,22 +231,20 @@ static void bury(struct slot *slot)
         process_wait(&slot->process, -1, &status);
     }
     slot->died_ns = clock_now_ns();
-    /* No render stops a process. */
-    bool outside =
-        slot->silent || (WIFSIGNALED(status) && !slot->hung &&
-                            (WTERMSIG(status) == SIGKILL || WTERMSIG(status) == SIGTERM));
+    enum death death = slot->silent ? DEATH_OUTSIDE : find_cause(status, slot->hung);
     const struct flight *suspect = worker_slot_find(slot, slot->turn_job);
     if (suspect && suspect->phase != PHASE_RENDERING)
         suspect = NULL;
     if (!is_stopping(pool)) {
         log_event(LOG_ERROR, "worker %u %s%s", slot->index, slot->hung ? "hung and " : "",
-            process_describe(status, text, sizeof text));
+            death_text(status, death, text, sizeof text));
         if (suspect)
             log_suspect(slot, suspect->render);
         pthread_mutex_lock(&pool->lock);
         pool->numbers.restarts++;
         pool->numbers.hangs += slot->hung;
-        pool->numbers.crashes += !slot->hung && !outside;
+        pool->numbers.crashes += !slot->hung && death == DEATH_OWN;
+        pool->numbers.starved += death == DEATH_MEMORY;
         pool->numbers.up -= slot->said_hello;
         pool->numbers.silent -= slot->silent;
         slot->silent = false;
@@ -213,8 +262,10 @@ static void bury(struct slot *slot)
         if (!flight->render)
             continue;
         /* Who had the turn, or, with nobody at work, what was encoded. */
-        bool guilty = suspect ? flight == suspect : flight->phase == PHASE_ENCODING;
-        survive(slot, flight, guilty, !outside);
+        bool guilty =
+            suspect ? flight == suspect
+                    : flight->phase == (death == DEATH_MEMORY ? PHASE_RENDERING : PHASE_ENCODING);
+        survive(slot, flight, guilty, death);
     }
 }
 
@@ -496,9 +547,10 @@ void worker_pool_drop_scene(struct worker_pool *pool, const uint8_t scene[PEN_ID
     worker_pool_wake(pool);
 }
 
-uint32_t worker_pool_quarantine_s(struct worker_pool *pool, const uint8_t scene[PEN_ID_BYTES])
+enum quarantined worker_pool_quarantined(
+    struct worker_pool *pool, const struct pen_request *request, uint32_t *remaining_s)
 {
-    return quarantine_remaining_s(pool->quarantine, scene);
+    return quarantine_check(pool->quarantine, request, remaining_s);
 }
 
 bool worker_pool_is_resident(struct worker_pool *pool, const uint8_t scene[PEN_ID_BYTES])

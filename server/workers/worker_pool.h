@@ -1,6 +1,7 @@
 /* Starts, feeds, watches and replaces the workers. One thread per worker; it alone touches that
  * worker's process and socket. */
 #pragma once
+#include "server/workers/quarantine.h"
 #include "server/workers/worker_figures.h"
 
 struct worker_pool;
@@ -15,6 +16,8 @@ void worker_pool_drop_scene(struct worker_pool *pool, const uint8_t scene[PEN_ID
 /* A worker has the scene in GPU memory. */
 bool worker_pool_is_resident(struct worker_pool *pool, const uint8_t scene[PEN_ID_BYTES]);
 /* Seconds for which a scene that ended two workers is still refused; 0: it is not. */
-uint32_t worker_pool_quarantine_s(struct worker_pool *pool, const uint8_t scene[PEN_ID_BYTES]);
+/* As quarantine_check. */
+enum quarantined worker_pool_quarantined(
+    struct worker_pool *pool, const struct pen_request *request, uint32_t *remaining_s);
 
 void worker_pool_read(struct worker_pool *pool, struct worker_pool_numbers *numbers);

@@ -112,7 +112,10 @@ class Faults(unittest.TestCase):
                 os.kill(pid, signal.SIGSEGV)
         thread.join()
         self.assertEqual(box[0].status, 500, box[0].body)
-        self.assertEqual(self.d.render(bad, SMALL).status, 422)
+        held = self.d.render(bad, HEAVY)
+        self.assertEqual(held.status, 422, held.body)
+        self.assertGreater(int(held.headers["Retry-After"]), 0)
+        self.assertEqual(self.d.render(bad, SMALL).status, 200)  # this was not tried yet
         self.assertEqual(self.d.render(good, SMALL).status, 200)
         self.assertEqual(self.d.metric("penumbra_quarantined_scenes"), 1)
 

@@ -213,24 +213,37 @@ static void test_pages(void)
 static void test_quarantine(void)
 {
     struct quarantine *q = quarantine_create(100);
-    uint8_t a[PEN_ID_BYTES] = {1}, b[PEN_ID_BYTES] = {2};
-    CHECK(!quarantine_blame(q, a));
-    CHECK(quarantine_remaining_s(q, a) == 0);
-    CHECK(!quarantine_blame(q, b));
-    CHECK(quarantine_blame(q, a));
-    CHECK(quarantine_remaining_s(q, a) >= 99 && quarantine_remaining_s(q, a) <= 100);
-    CHECK(quarantine_remaining_s(q, b) == 0);
-    CHECK(quarantine_count(q) == 1);
+    struct pen_request a = {.scene = {1}, .technique = "pcss", .width = 4, .height = 3}, b = a,
+                       wide = a, other = a;
+    uint32_t left = 0;
+    b.scene[0] = 2;
+    wide.width++;
+    strcpy(other.technique, "vssm");
+    CHECK(quarantine_blame(q, &a) == QUARANTINE_NOTHING);
+    CHECK(quarantine_check(q, &a, &left) == QUARANTINE_NOTHING && left == 0);
+    CHECK(quarantine_blame(q, &b) == QUARANTINE_NOTHING && quarantine_count(q) == 0);
+    CHECK(quarantine_blame(q, &a) == QUARANTINE_REQUEST);
+    CHECK(quarantine_check(q, &a, &left) == QUARANTINE_REQUEST && left >= 99 && left <= 100);
+    a.exposure_ev = 1; /* as likely to end one */
+    CHECK(quarantine_check(q, &a, &left) == QUARANTINE_REQUEST);
+    /* The scene is drawn otherwise, until that has ended two workers, too. */
+    CHECK(quarantine_check(q, &wide, &left) == QUARANTINE_NOTHING);
+    CHECK(quarantine_check(q, &other, &left) == QUARANTINE_NOTHING);
+    CHECK(quarantine_check(q, &b, &left) == QUARANTINE_NOTHING && quarantine_count(q) == 1);
+    CHECK(quarantine_blame(q, &wide) == QUARANTINE_NOTHING);
+    CHECK(quarantine_blame(q, &other) == QUARANTINE_SCENE);
+    CHECK(quarantine_check(q, &wide, &left) == QUARANTINE_SCENE && left >= 99 && left <= 100);
+    CHECK(quarantine_check(q, &b, &left) == QUARANTINE_NOTHING && quarantine_count(q) == 1);
     for (uint8_t i = 0; i < 200; i++) { /* more suspects than there is room for */
-        uint8_t other[PEN_ID_BYTES] = {3, i};
-        CHECK(!quarantine_blame(q, other));
+        struct pen_request many = {.scene = {3, i}};
+        CHECK(quarantine_blame(q, &many) == QUARANTINE_NOTHING);
     }
-    CHECK(quarantine_count(q) <= 1);
+    CHECK(quarantine_count(q) == 0);
     quarantine_destroy(q);
     q = quarantine_create(0); /* never holds anything back */
-    quarantine_blame(q, a);
-    quarantine_blame(q, a);
-    CHECK(quarantine_remaining_s(q, a) == 0);
+    quarantine_blame(q, &a);
+    quarantine_blame(q, &a);
+    CHECK(quarantine_check(q, &a, &left) == QUARANTINE_NOTHING);
     quarantine_destroy(q);
 }
 

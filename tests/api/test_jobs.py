@@ -1,55 +1,13 @@
 """Jobs: renders that nobody waits for, and sequences of many views."""
-import http.client
 import io
-import json
 import os
-import sqlite3
 import struct
-import time
 import unittest
 import zipfile
 
 import harness
 from harness import HEAVY, SMALL, Daemon, grid_scene, wait
-
-TINY = {"technique": {"name": "hard"}, "width": 24, "height": 16}
-ASYNC = {"Content-Type": "application/json", "Prefer": "respond-async"}
-OVER = ("successful", "failed", "dismissed")
-
-
-def post(d, path, request, **headers):
-    return d.call("POST", path, json.dumps(request),
-                  {"Content-Type": "application/json",
-                   **{k.replace("_", "-"): v for k, v in headers.items()}})
-
-
-def start(d, scene, sequence, **request):
-    answer = post(d, "/v1/jobs", {"scene": scene, **TINY, **request, "sequence": sequence})
-    assert answer.status == 202, answer.body
-    return answer.json()
-
-
-def job(d, id):
-    return d.get("/v1/jobs/" + id).json()
-
-
-def ended(d, id):
-    wait(lambda: job(d, id)["state"] in OVER, 120)
-    return job(d, id)
-
-
-def frame(d, id, number):
-    answer = d.get("/v1/jobs/%s/frames/%d" % (id, number))
-    assert answer.status == 200, answer.body
-    return answer.body
-
-
-def single(d, id, scene, number):
-    """The picture of a frame's own request, rendered by itself and anew."""
-    request = d.get("/v1/jobs/%s/frames/%d" % (id, number), Accept="application/json").json()
-    answer = d.render(scene, {**request, "deadline_ms": 300000})
-    assert answer.status == 200, answer.body
-    return answer.body
+from jobs import ASYNC, TINY, Events, ended, frame, job, post, single, start
 
 
 def chunks(data):
@@ -71,34 +29,6 @@ def animation(data):
     assert data[:4] == b"RIFF" and data[8:12] == b"WEBP"
     return [([c for c in chunks(body[16:])], int.from_bytes(body[12:15], "little"))
             for name, body in chunks(data[12:]) if name == b"ANMF"]
-
-
-class Events:
-    """A connection to a job's events."""
-
-    def __init__(self, d, id, last=None):
-        self.connection = http.client.HTTPConnection("127.0.0.1", d.port,
-                                                     timeout=60 * harness.PATIENCE)
-        headers = {} if last is None else {"Last-Event-ID": str(last)}
-        self.connection.request("GET", "/v1/jobs/%s/events" % id, None, headers)
-        self.response = self.connection.getresponse()
-
-    def __iter__(self):
-        """(id, event, data) of each, until the stream ends."""
-        event = {}
-        for line in self.response:
-            line = line.decode().rstrip("\n")
-            if line.startswith(":"):
-                continue
-            if line:
-                key, value = line.split(": ", 1)
-                event[key] = value
-            elif "data" in event:
-                yield int(event["id"]), event["event"], json.loads(event["data"])
-                event = {}
-
-    def close(self):
-        self.connection.close()
 
 
 class Jobs(unittest.TestCase):
@@ -260,6 +190,134 @@ class Jobs(unittest.TestCase):
         self.problem(post(self.d, "/v1/jobs", {**TINY}), 422, "/scene")
         self.problem(post(self.d, "/v1/jobs", {**TINY, "scene": "0" * 64}), 404)
         self.problem(self.d.call("POST", "/v1/jobs?a=1", "{}", ASYNC), 400)
+
+    def test_frames_that_cannot_be_had(self):
+        """What is there stays, and the job says why it ended."""
+        id = start(self.d, self.scene, {"views": [{}, {"eye": [1, 2, 3]}, {"index": 7}]})["id"]
+        done = ended(self.d, id)
+        self.assertEqual(done["state"], "failed")
+        self.assertIn("Frame 2", done["error"]["detail"])
+        self.assertEqual(done["frames"]["failed"], 1)
+        there = [self.d.get("/v1/jobs/%s/frames/%d" % (id, i)).status for i in range(3)]
+        self.assertEqual(there.count(200), done["frames"]["done"])
+        self.assertEqual(there[2], 404)
+        self.problem(self.d.get("/v1/jobs/%s/result" % id), 404)
+
+    # ---- files ----
+
+    def test_ranges(self):
+        id = start(self.d, self.scene, {"frames": 3})["id"]
+        path = ended(self.d, id)["links"]["result"]
+        whole = self.d.get(path)
+        size, tag = len(whole.body), whole.headers["ETag"]
+        self.assertEqual(whole.headers["Accept-Ranges"], "bytes")
+        self.assertIn("Expires", whole.headers)
+        got = b""
+        for first in range(0, size, 100):
+            last = min(first + 99, size - 1)
+            part = self.d.get(path, Range="bytes=%d-%d" % (first, first + 99))
+            self.assertEqual((part.status, part.headers["Content-Range"]),
+                             (206, "bytes %d-%d/%d" % (first, last, size)))
+            self.assertEqual(part.headers["ETag"], tag)
+            got += part.body
+        self.assertEqual(got, whole.body)
+        self.assertEqual(self.d.get(path, Range="bytes=-10").body, whole.body[-10:])
+        self.assertEqual(self.d.get(path, Range="bytes=%d-" % (size - 3)).body, whole.body[-3:])
+        self.assertEqual(self.d.get(path, Range="bytes=0-5", If_Range=tag).body, whole.body[:6])
+        for ignored in ({"Range": "bytes=0-5", "If_Range": '"other"'}, {"Range": "bytes=0-1,4-5"},
+                        {"Range": "lines=1-2"}, {"Range": "bytes=5-2"}):
+            answer = self.d.get(path, **ignored)
+            self.assertEqual((answer.status, answer.body), (200, whole.body), ignored)
+        outside = self.d.get(path, Range="bytes=%d-" % size)
+        self.problem(outside, 416)
+        self.assertEqual(outside.headers["Content-Range"], "bytes */%d" % size)
+        self.assertEqual(self.d.get(path, If_None_Match=tag).status, 304)
+        head = self.d.call("HEAD", path)
+        self.assertEqual((head.status, int(head.headers["Content-Length"])), (200, size))
+
+    def test_a_damaged_file_is_never_sent(self):
+        id = start(self.d, self.scene, {"frames": 2})["id"]
+        ended(self.d, id)
+        with open(os.path.join(self.d.store, "jobs", id, "000001.png"), "r+b") as file:
+            file.seek(20)
+            file.write(b"damage")
+        self.problem(self.d.get("/v1/jobs/%s/frames/1" % id), 500)
+        self.assertEqual(self.d.get("/v1/jobs/%s/frames/0" % id).status, 200)
+
+    # ---- events ----
+
+    def test_events(self):
+        id = start(self.d, self.scene, {"frames": 20, "turntable": {}})["id"]
+        seen, last = [], None
+        while True:  # from connection to connection
+            events = Events(self.d, id, last)
+            if events.response.status == 204:
+                events.close()
+                break
+            self.assertEqual(events.response.headers["Content-Type"], "text/event-stream")
+            for number, event in enumerate(events):
+                seen.append(event)
+                last = event[0]
+                if number == 5:
+                    break
+            events.close()
+        ids = [e[0] for e in seen]
+        self.assertEqual(ids, sorted(set(ids)))
+        frames = [e[2]["frame"] for e in seen if e[1] == "frame"]
+        self.assertEqual(sorted(frames), list(range(20)))
+        self.assertEqual([e[2]["done"] for e in seen if e[1] == "frame"], list(range(1, 21)))
+        self.assertEqual((seen[-1][1], seen[-1][2]["state"]), ("state", "successful"))
+        for event in seen:
+            if event[1] == "frame":
+                self.assertEqual(len(self.d.get(event[2]["href"]).body), event[2]["bytes"])
+
+    # ---- cancelling ----
+
+    def test_cancel(self):
+        before = self.d.metric("penumbra_renders_cancelled_total")
+        id = start(self.d, self.scene, {"frames": 500, "turntable": {}}, antialias=16,
+                   **{k: HEAVY[k] for k in ("technique", "width", "height")})["id"]
+        wait(lambda: self.d.metric("penumbra_renders_running"))
+        answer = self.d.call("DELETE", "/v1/jobs/" + id)
+        self.assertEqual((answer.status, answer.json()["state"]), (200, "dismissed"))
+        wait(lambda: self.d.metric("penumbra_renders_running") == 0)
+        self.assertGreater(self.d.metric("penumbra_renders_cancelled_total"), before)
+        self.assertEqual(job(self.d, id)["state"], "dismissed")
+        self.assertEqual([e[2]["state"] for e in Events(self.d, id) if e[1] == "state"][-1:],
+                         ["dismissed"])
+        self.assertEqual(self.d.call("DELETE", "/v1/jobs/" + id).status, 204)
+
+    def test_who_waits_goes_first(self):
+        id = start(self.d, self.scene, {"frames": 300, "turntable": {}}, width=400, height=300,
+                   antialias=8)["id"]
+        wait(lambda: job(self.d, id)["state"] == "running")
+        for _ in range(5):
+            self.assertEqual(self.d.render(self.scene, SMALL).status, 200)
+        self.assertEqual(job(self.d, id)["state"], "running")
+        self.d.call("DELETE", "/v1/jobs/" + id)
+
+    # ---- keys ----
+
+    def test_idempotency_key(self):
+        body = {"scene": self.scene, **TINY, "sequence": {"frames": 2}}
+        first = post(self.d, "/v1/jobs", body, Idempotency_Key="one")
+        again = post(self.d, "/v1/jobs", body, Idempotency_Key="one")
+        self.assertEqual([first.status, again.status], [202, 202])
+        self.assertEqual(again.headers["Location"], first.headers["Location"])
+        other = post(self.d, "/v1/jobs", body, Idempotency_Key="two")
+        self.assertNotEqual(other.headers["Location"], first.headers["Location"])
+        body["sequence"]["frames"] = 3
+        self.problem(post(self.d, "/v1/jobs", body, Idempotency_Key="one"), 422)
+        path = "/v1/scenes/%s/render" % self.scene
+        self.problem(post(self.d, path, SMALL, Idempotency_Key="one"), 422)
+        at_once = [post(self.d, path, SMALL, Idempotency_Key="three") for _ in range(2)]
+        self.assertEqual(at_once[0].body, at_once[1].body)
+        self.problem(post(self.d, path, TINY, Idempotency_Key="three"), 422)
+        self.problem(post(self.d, path, SMALL, Idempotency_Key="x" * 256), 400)
+        # With the job its key goes, too.
+        ended(self.d, first.json()["id"])
+        self.d.call("DELETE", first.headers["Location"])
+        self.assertEqual(post(self.d, "/v1/jobs", body, Idempotency_Key="one").status, 202)
 
     # ---- what there is ----
 

@@ -27,7 +27,7 @@ static bool fail(struct database *d, int code, struct pen_error *error)
         break;
     case SQLITE_CORRUPT:
     case SQLITE_NOTADB:
-        why = "is damaged: with its file moved away, the next start makes a new one";
+        why = "is damaged: when its file is moved away a new one is made";
         break;
     case SQLITE_FULL:
         why = "has no room: the disk is full";

@@ -260,10 +260,13 @@ static void draw(const struct drawing *d, const struct corner c[3])
             uint32_t pixels = tile->pixels & bits_between(x, y, x0, x1, y0, y1);
             if (!pixels)
                 continue;
+            places *depths = cover->depths + (size_t)tile->slot * COVER_PIXELS;
+            for (int i = 0; i < COVER_PIXELS; i += COVER_TILE)
+                __builtin_prefetch(&depths[i]);
             if (!ready && !set_up(d, c, &t))
                 return;
             ready = true;
-            draw_tile(d, &t, x, y, pixels, cover->depths + (size_t)tile->slot * COVER_PIXELS);
+            draw_tile(d, &t, x, y, pixels, depths);
         }
 }
 

@@ -121,31 +121,52 @@ static cover_places sample(
     return (a + (t - top) * (b - a)) / 255.0f;
 }
 
-static cover_places sample_levels(
-    const struct cover_alpha *alpha, const cover_places at[2], float level)
+static bool any(cover_bits bits)
+{
+    return bits[0] | bits[1] | bits[2] | bits[3];
+}
+
+/* Which places are there when their alpha is a. */
+static cover_bits kept(const struct cover_alpha *alpha, cover_places a)
+{
+    if (alpha->material->alpha_mode == PSC_MASK)
+        return ~(a < alpha->material->alpha_cutoff);
+    return alpha->material->alpha_mode == PSC_BLEND ? a > alpha->threshold : ~(cover_bits){0};
+}
+
+/* Of a texture between two levels: mostly the one that has the larger share decides alone. */
+static cover_bits cut_between(const struct cover_alpha *alpha, const cover_places at[3],
+    uint32_t finer, float share, cover_bits which)
+{
+    bool coarse = share > 0.5f;
+    cover_places first = sample(alpha, at, finer + coarse, alpha->texture->nearest & 2);
+    float own = coarse ? share : 1 - share;
+    cover_bits surely = kept(alpha, at[2] * own * first);
+    cover_bits perhaps = kept(alpha, at[2] * (own * first + (1 - own)));
+    if (!any(which & (surely ^ perhaps)))
+        return which & surely;
+    cover_places second = sample(alpha, at, finer + !coarse, alpha->texture->nearest & 2);
+    return which & kept(alpha, at[2] * (own * first + (1 - own) * second));
+}
+
+static cover_bits cut_textured(
+    const struct cover_alpha *alpha, const cover_places at[3], float level, cover_bits which)
 {
     uint32_t filter = alpha->texture->nearest, last = alpha->last;
-    if (!(level > 0))
-        return sample(alpha, at, 0, filter & 1);
-    bool nearest = filter & 2;
-    if (filter & 8 || !last)
-        return sample(alpha, at, 0, nearest);
+    uint32_t number = 0;
+    bool minified = level > 0, nearest = filter & (minified ? 2 : 1);
     level = fminf(level, (float)last);
-    if (filter & 4)
-        return sample(alpha, at, (uint32_t)(level + 0.5f), nearest);
-    uint32_t finer = (uint32_t)level < last ? (uint32_t)level : last - 1;
-    cover_places a = sample(alpha, at, finer, nearest);
-    cover_places b = sample(alpha, at, finer + 1, nearest);
-    return a + (level - (float)finer) * (b - a);
+    if (minified && last && !(filter & 8)) {
+        uint32_t finer = (uint32_t)level < last ? (uint32_t)level : last - 1;
+        if (!(filter & 4))
+            return cut_between(alpha, at, finer, level - (float)finer, which);
+        number = (uint32_t)(level + 0.5f);
+    }
+    return which & kept(alpha, at[2] * sample(alpha, at, number, nearest));
 }
 
 cover_bits cover_alpha_cut(
     const struct cover_alpha *alpha, const cover_places at[3], float level, cover_bits which)
 {
-    cover_places a = at[2];
-    if (alpha->texture)
-        a *= sample_levels(alpha, at, level);
-    if (alpha->material->alpha_mode == PSC_MASK)
-        return which & ~(a < alpha->material->alpha_cutoff);
-    return alpha->material->alpha_mode == PSC_BLEND ? which & (a > alpha->threshold) : which;
+    return alpha->texture ? cut_textured(alpha, at, level, which) : which & kept(alpha, at[2]);
 }

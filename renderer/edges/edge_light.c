@@ -8,6 +8,10 @@
 #define GUESSES 1024
 #define BEHIND 0.998f /* what is less than this behind something may be part of it */
 #define HALF_MAX 65504.0f
+#define MIXED 0.3f  /* as much of its neighbours' light has a place that its own plane explains */
+#define CENTRE 0.5f /* weight of what was shaded, over that of a place */
+#define AROUND_PIXELS 9
+#define OWN 4
 
 typedef cover_places four;
 
@@ -16,10 +20,17 @@ struct plane {
     float at, across, down;
 };
 
+/* A plane as places ask it. */
+struct surface {
+    struct plane plane;
+    four places; /* its depth at each of the pixel's own */
+    float rise;  /* per pixel */
+};
+
 /* What is seen at a pixel. */
 struct look {
     four light; /* times alpha */
-    struct plane solid, front;
+    struct surface solid, front;
 };
 
 /* A tile, and what lies beside it. */
@@ -33,6 +44,7 @@ struct around {
 static float linear_of[256];
 static float code_begins[257]; /* the least light that is nearest to a code */
 static uint8_t guesses[GUESSES];
+static four nearness[AROUND_PIXELS]; /* of each of 3 x 3 pixels to the places */
 
 static void make_tables(void)
 {
@@ -46,6 +58,10 @@ static void make_tables(void)
         while (code < 255 && code_begins[code + 1] <= (float)i / GUESSES)
             code++;
         guesses[i] = (uint8_t)code;
+    }
+    for (int k = 0; k < AROUND_PIXELS; k++) {
+        four across = (float)(k % 3 - 1) - cover_across, down = (float)(k / 3 - 1) - cover_down;
+        nearness[k] = 1 / (1 + across * across + down * down);
     }
     code_begins[256] = INFINITY;
 }
@@ -135,8 +151,8 @@ static uint32_t bent_pixels(const float *row, uint32_t stride)
     four depth = load(row), left = load(row - 1), right = load(row + 1);
     four above = load(row - stride), below = load(row + stride), twice = depth + depth;
     four bend = larger(size(left + right - twice), size(above + below - twice));
-    four rise = size(left - right) + size(above - below) + 2e-4f * depth;
-    cover_bits bent = (bend > 0.1f * rise) & (cover_bits){1, 2, 4, 8};
+    four rise = size(left - right) + size(above - below) + 1e-2f * depth;
+    cover_bits bent = (bend > 0.03f * rise) & (cover_bits){1, 2, 4, 8};
     return any(bent) ? (uint32_t)(bent[0] | bent[1] | bent[2] | bent[3]) : 0;
 }
 
@@ -277,7 +293,7 @@ static void direction(const uint16_t code[4], float n[3])
 }
 
 /* plane_of() */
-static struct plane plane_of(
+static struct surface surface_of(
     const struct edge_rows *e, float depth, const uint16_t normal[4], uint32_t x, uint32_t y)
 {
     const struct view *v = e->view;
@@ -287,7 +303,10 @@ static struct plane plane_of(
     float facing = dot(n, v->forward) + across * ((float)x + 0.5f - 0.5f * (float)v->width) +
                    down * ((float)y + 0.5f - 0.5f * (float)v->height);
     float scale = depth / (facing < -1e-4f ? facing : -1e-4f);
-    return (struct plane){depth, across * scale, down * scale};
+    struct plane p = {depth, across * scale, down * scale};
+    return (struct surface){.plane = p,
+        .places = p.at + p.across * cover_across + p.down * cover_down,
+        .rise = fabsf(p.across) + fabsf(p.down) + 1e-20f};
 }
 
 static float half_to_float(uint16_t half)
@@ -355,22 +374,21 @@ static const struct look *look_at(struct around *a, uint32_t x, uint32_t y)
     size_t normal = (size_t)(y + 1 - e->first) * width + x;
     look->light = light_at(e, x, y);
     float depth = row_at(e, e->solid.depths, y)[x];
-    look->solid = look->front = plane_of(e, depth, e->solid.normals[normal], x, y);
+    look->solid = look->front = surface_of(e, depth, e->solid.normals[normal], x, y);
     float before = e->layered ? row_at(e, e->front.depths, y)[x] : 0;
     if (before > 0)
-        look->front = plane_of(e, before, e->front.normals[normal], x, y);
+        look->front = surface_of(e, before, e->front.normals[normal], x, y);
     return look;
 }
 
 /* match() */
-static four match(const struct plane *plane, four depths, float across, float down)
+static four match(const struct surface *s, four depths, float across, float down)
 {
+    const struct plane *plane = &s->plane;
     if (plane->at == 0)
         return choose(depths == 0.0f, all(10), all(1e-9f));
-    four miss = plane->at - plane->across * across - plane->down * down - depths;
-    miss = size(miss + plane->across * cover_across + plane->down * cover_down);
-    four rise =
-        fabsf(plane->across) + fabsf(plane->down) + 1e-20f + 2e-3f * larger(depths, all(plane->at));
+    four miss = size(s->places - (plane->across * across + plane->down * down) - depths);
+    four rise = s->rise + 2e-3f * larger(depths, all(plane->at));
     return rise / (miss + 0.1f * rise);
 }
 
@@ -383,36 +401,39 @@ static four match_both(const struct edge_rows *e, const struct look *look, four 
     return how;
 }
 
+static float sum_of(four a)
+{
+    return (a[0] + a[1]) + (a[2] + a[3]);
+}
+
 /* As edges.frag. slot: number of the pixel's places. */
 static void blend_pixel(struct around *a, uint32_t x, uint32_t y, size_t slot)
 {
     const struct edge_rows *e = a->e;
     four solid = e->solid.places[slot];
     four front = e->layered ? larger(solid, e->front.places[slot]) : solid;
-    const struct look *own = look_at(a, x, y);
-    four weights = match_both(e, own, solid, front, 0, 0);
-    four open = 4 - 0.42f * weights; /* 0 where the pixel's own plane explains the place */
-    open = choose(open < 1.0f, larger(open, all(0)), all(1));
+    const struct look *looks[AROUND_PIXELS];
+    looks[OWN] = look_at(a, x, y);
+    four own = match_both(e, looks[OWN], solid, front, 0, 0);
+    four open = 4 - 0.42f * own; /* 0 where the pixel's own plane explains the place */
     if (!any(open > 0.0f))
         return;
-    four sums[COVER_PLACES], light = all(0);
-    for (int i = 0; i < COVER_PLACES; i++)
-        sums[i] = weights[i] * own->light;
-    for (int k = 0; k < 9; k++) {
-        if (k == 4)
+    open = choose(open < 1.0f, larger(open, all(MIXED)), all(1));
+    four weights[AROUND_PIXELS], sum = weights[OWN] = own * nearness[OWN];
+    for (int k = 0; k < AROUND_PIXELS; k++) {
+        if (k == OWN)
             continue;
         uint32_t px = clamped(x, k % 3 - 1, e->view->width);
         uint32_t py = clamped(y, k / 3 - 1, e->view->height);
-        const struct look *other = look_at(a, px, py);
-        four weight = open * match_both(e, other, solid, front, (float)(int32_t)(px - x),
-                                 (float)(int32_t)(py - y));
-        weights += weight;
-        for (int i = 0; i < COVER_PLACES; i++)
-            sums[i] += weight[i] * other->light;
+        looks[k] = look_at(a, px, py);
+        weights[k] = match_both(
+            e, looks[k], solid, front, (float)(int32_t)(px - x), (float)(int32_t)(py - y));
+        sum += weights[k] *= open * nearness[k];
     }
-    weights = 1 / (COVER_PLACES * weights);
-    for (int i = 0; i < COVER_PLACES; i++)
-        light += sums[i] * weights[i];
+    four light = all(0), share = 1 / ((COVER_PLACES + CENTRE) * sum);
+    for (int k = 0; k < AROUND_PIXELS; k++)
+        light += sum_of(weights[k] * share) * looks[k]->light;
+    light += CENTRE / (COVER_PLACES + CENTRE) * looks[OWN]->light;
     store_light(e, x, y, light);
 }
 

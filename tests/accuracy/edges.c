@@ -161,6 +161,10 @@ int main(int argc, char **argv)
     harness_scene(
         &(struct pen_generated_options){.kind = PEN_GENERATED_FOLIAGE, .triangles = 4000}, id);
     check_scene("leaves cut out by alpha", id, "sky=on", 0.5);
+    harness_scene(&(struct pen_generated_options){.kind = PEN_GENERATED_FOLIAGE}, id);
+    check_scene("foliage", id, "sky=on", 0.5);
+    harness_scene(&(struct pen_generated_options){.kind = PEN_GENERATED_DEMO}, id);
+    check_scene("demo", id, "sky=on", 0.5);
     check_panes();
     CHECK_DONE();
 }

@@ -24,6 +24,9 @@ layout(binding = UNIT_FRONT_PLACES) uniform sampler2DMS front_places;
 
 layout(location = 0) out vec4 color;
 
+const float MIXED = 0.3; // as much of its neighbours' light has a place that its own plane explains
+const float CENTRE = 0.5; // weight of what was shaded, over that of a place
+
 // What the file holds of a pixel, without its neighbours.
 vec4 alone(vec4 c)
 {
@@ -115,6 +118,13 @@ vec4 match_both(Planes planes, vec4 solid, vec4 front, vec2 offset)
     return how;
 }
 
+// Of the places to the pixel at `offset`.
+vec4 nearness(vec2 offset)
+{
+    vec4 across = offset.x - edge.across, down = offset.y - edge.down;
+    return 1.0 / (1.0 + across * across + down * down);
+}
+
 void main()
 {
     ivec2 pixel = ivec2(gl_FragCoord.xy), last = ivec2(view.viewport.xy) - 1;
@@ -137,8 +147,10 @@ void main()
 #endif
         // 0 where the pixel's own plane explains the place.
         own = match_both(planes_at(pixel, right, up), depths, front, vec2(0.0));
-        open = clamp(4.0 - 0.42 * own, 0.0, 1.0);
+        open = 4.0 - 0.42 * own;
         around = any(greaterThan(open, vec4(0.0))) ? 8 : 0;
+        open = clamp(open, MIXED, 1.0);
+        own *= nearness(vec2(0.0));
     }
     vec4 sums[EDGE_PLACES], weights = own, own_light = light_of(texelFetch(picture, pixel, 0));
     for (int i = 0; i < EDGE_PLACES; i++)
@@ -147,15 +159,17 @@ void main()
         int other = k < 4 ? k : k + 1; // of 3 x 3, without the middle
         ivec2 at = clamp(pixel + ivec2(other % 3, other / 3) - 1, ivec2(0), last);
         vec4 weight = open * match_both(planes_at(at, right, up), depths, front, vec2(at - pixel));
+        weight *= nearness(vec2(other % 3, other / 3) - 1.0);
         weights += weight;
         vec4 light = light_of(texelFetch(picture, at, 0));
         for (int i = 0; i < EDGE_PLACES; i++)
             sums[i] += weight[i] * light;
     }
     for (int once = 0; once < around; once += 8) {
-        vec4 light = vec4(0.0);
+        vec4 light = CENTRE * own_light;
         for (int i = 0; i < EDGE_PLACES; i++)
-            light += sums[i] / (weights[i] * float(EDGE_PLACES));
+            light += sums[i] / weights[i];
+        light /= float(EDGE_PLACES) + CENTRE;
         color = light;
 #ifndef RAW
         color.rgb = light.a > 0.0 ? srgb_encode(light.rgb / light.a) : vec3(0.0);

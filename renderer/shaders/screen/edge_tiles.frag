@@ -34,8 +34,8 @@ Row lower_row(vec4 a, vec4 b, vec4 c)
 bvec4 are_bent(vec4 left, vec4 right, vec4 above, vec4 below, vec4 depth)
 {
     vec4 bend = max(abs(left + right - 2.0 * depth), abs(above + below - 2.0 * depth));
-    vec4 rise = abs(left - right) + abs(above - below) + 2e-4 * depth;
-    return greaterThan(bend, 0.1 * rise);
+    vec4 rise = abs(left - right) + abs(above - below) + 1e-2 * depth;
+    return greaterThan(bend, 0.03 * rise);
 }
 
 int bits_of_row(Row above, Row row, Row below)

@@ -5,9 +5,11 @@
 
 #define MOST_RETRY_S 600
 #define MOST_RATIO 10.0
-/* Of several that are to be done together the last one counts: what others and the machine do
- * meanwhile must not take it beyond the deadline. */
-#define RESERVE 1.35
+/* Where everything that is let in would be done just in time, half of it would be late. Of several that
+ * are to be done together the last one counts: what others and the machine do meanwhile must not take it
+ * beyond the deadline. */
+#define RESERVE 1.2
+#define RESERVE_OF_SEVERAL 1.35
 
 /* What one takes until the next of its client can be begun. */
 static double ratio_of(const struct scheduler *s, const struct render *render)
@@ -19,6 +21,36 @@ void scheduler_learn_ratio(struct scheduler *s, double renderer_ms, double run_m
 {
     double ratio = fmin(MOST_RATIO, fmax(1, run_ms / fmax(1, renderer_ms)));
     s->measured_ratio += 0.2 * (ratio - s->measured_ratio);
+}
+
+#define PACE_KEPT 0.95 /* of what was counted before, with every render */
+#define MOST_PACE 20.0
+
+void scheduler_pace_begin(struct scheduler *s)
+{
+    s->paced_ns = s->limits.now_ns();
+}
+
+void scheduler_pace(struct scheduler *s, const struct render *render, bool counts, double ms)
+{
+    uint64_t now = s->limits.now_ns();
+    double took = clock_ms(now - s->paced_ns);
+    double foreseen = ratio_of(s, render) * render->estimate.sure * render->estimate.least_ms;
+    s->paced_ns = now;
+    counts &= foreseen > 0;
+    took = counts ? took : fmax(0, took - ms); /* it was in the way of those that count */
+    s->paced_ms = PACE_KEPT * s->paced_ms + took * s->limits.workers;
+    s->foreseen_ms = PACE_KEPT * s->foreseen_ms + (counts ? foreseen : 0);
+    s->paced_count = PACE_KEPT * s->paced_count + counts;
+}
+
+/* How many times as long as is known of them renders take here, one after the other: what they take
+ * beside the renderer, what else the machine does, and that what is known is the least. */
+static double pace(const struct scheduler *s)
+{
+    double one = s->foreseen_ms / fmax(1, s->paced_count); /* that would be as foreseen */
+    double times = one > 0 ? (s->paced_ms + one) / (s->foreseen_ms + one) : 1;
+    return fmin(MOST_PACE, fmax(1, times));
 }
 
 void scheduler_foresee(
@@ -64,7 +96,7 @@ static uint32_t whole_seconds(double ms)
 /* When about half of what is there is done. */
 uint32_t scheduler_retry_s(const struct scheduler *s)
 {
-    return whole_seconds(scheduler_backlog_ms(s, s->mean_ms) / 2);
+    return whole_seconds(pace(s) * scheduler_backlog_ms(s, s->mean_ms) / 2);
 }
 
 /* How long a new render will wait at least. As all are served in turn, no other client is in its way
@@ -108,10 +140,10 @@ bool scheduler_is_late(struct scheduler *s, const struct render *render, uint64_
     uint64_t now = s->limits.now_ns();
     double left = waiter->deadline_ns > now ? clock_ms(waiter->deadline_ns - now) : 0;
     double own = waiter->best ? 0 : render->estimate.sure * render->estimate.least_ms;
-    own = ratio_of(s, render) * (own + render->following_sure_ms);
+    own = pace(s) * ratio_of(s, render) * (own + render->following_sure_ms);
     double most = waiter->following_count ? left : left / 2; /* many say more than one */
-    double reserve = waiter->following_count ? RESERVE : 1;
-    double wait = reserve * wait_ms(s, payer, render->batch, own);
+    double reserve = waiter->following_count ? RESERVE_OF_SEVERAL : RESERVE;
+    double wait = reserve * pace(s) * wait_ms(s, payer, render->batch, own / pace(s));
     double over = wait + fmin(reserve * own, most) - left;
     if (!(wait > 0 && over > 0) || estimates_doubt(s->estimates, &render->request, now))
         return false;
@@ -127,7 +159,7 @@ bool scheduler_is_hopeless(const struct scheduler *s, const struct render *rende
     uint64_t now = s->limits.now_ns();
     double own = render->estimate.sure * render->estimate.least_ms + render->following_sure_ms;
     double needs = ratio_of(s, render) * own;
-    if (render->continues || render->following_sure_ms <= 0 || render->last_deadline_ns < now)
+    if (render->continues || render->best_until_ns || render->last_deadline_ns < now)
         return false;
     const struct render *before[] = {s->running, s->queue[0]};
     bool others = false;
@@ -137,5 +169,5 @@ bool scheduler_is_hopeless(const struct scheduler *s, const struct render *rende
                 needs += r->estimate.sure * left_ms(s, r, 0) / fmax(1, s->limits.workers);
                 others = true;
             }
-    return others && needs > clock_ms(render->last_deadline_ns - now);
+    return others && pace(s) * needs > clock_ms(render->last_deadline_ns - now);
 }

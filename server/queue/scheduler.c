@@ -331,6 +331,8 @@ static void start(struct scheduler *s, struct render *render)
     for (struct render *r = s->queue[0]; r != render; r = r->next)
         r->passed++;
     unlink_queued(s, render);
+    if (!s->numbers.running)
+        scheduler_pace_begin(s);
     render->running = true;
     render->taken_ns = s->limits.now_ns();
     render->charged_ms = render->estimate.ms < 0 ? s->mean_ms : render->estimate.ms;
@@ -363,10 +365,10 @@ static void turn_away_hopeless(struct scheduler *s)
     }
     if (list)
         prune(s);
-    outcome.error.retry_after_s = scheduler_retry_s(s);
-    pthread_mutex_unlock(&s->lock);
     pen_fail(&outcome.error, PEN_UNAVAILABLE, "/deadline_ms",
         "What was asked for before took longer than was known: this would not be ready in time.");
+    outcome.error.retry_after_s = scheduler_retry_s(s);
+    pthread_mutex_unlock(&s->lock);
     answer_all(list, &outcome);
 }
 
@@ -444,6 +446,7 @@ void scheduler_finish(struct scheduler *s, struct render *render, const struct o
         estimates_learn(s->estimates, &render->request, ms / picture_share(outcome->result), ok,
             s->limits.now_ns());
     settle(s, render, ms);
+    scheduler_pace(s, render, ok && tells, ms);
     double run_ms = clock_ms(s->limits.now_ns() - render->taken_ns);
     bool measured = render->measure != MEASURE_PICTURE;
     if (ok && measured)
@@ -456,8 +459,7 @@ void scheduler_finish(struct scheduler *s, struct render *render, const struct o
     answer.shared = count > 1;
     answer_all(waiters, &answer);
     free_render(render);
-    if (measured)
-        turn_away_hopeless(s);
+    turn_away_hopeless(s);
 }
 
 /* Moves the waiters that `now` has overtaken (UINT64_MAX: all of them) to *out. */

@@ -16,6 +16,10 @@ struct scheduler {
     /* How many times as long as it takes of the renderer something measured keeps a worker's places
      * for measurements: it is compared and encoded there. Decaying. */
     double measured_ratio;
+    /* Of the last renders that were made while the renderer was never idle, decaying: how long they
+     * took altogether, and what was known of them beforehand to take at least. */
+    double paced_ms, foreseen_ms, paced_count;
+    uint64_t paced_ns; /* until when it is counted */
     struct scheduler_numbers numbers;
     /* Constant after creation. */
     struct scheduler_limits limits;
@@ -40,6 +44,9 @@ bool scheduler_is_late(struct scheduler *s, const struct render *render, uint64_
     const struct waiter *waiter, struct pen_error *error);
 /* One that was measured took so much of the renderer, and so long until it was done. */
 void scheduler_learn_ratio(struct scheduler *s, double renderer_ms, double run_ms);
-/* Of the first of several, not begun yet: after what its client has before it, they will not all be
- * done in time. */
+/* A render begins, with nothing under way, or has ended; `counts`: it was made as it was foreseen to be. */
+void scheduler_pace_begin(struct scheduler *s);
+void scheduler_pace(struct scheduler *s, const struct render *render, bool counts, double ms);
+/* Not begun yet: after what its client has before it, it, and what follows it, will not be done in
+ * time. */
 bool scheduler_is_hopeless(const struct scheduler *s, const struct render *render);

@@ -13,7 +13,7 @@ struct archive_job {
     bool (*is_wanted)(void *context); /* asked now and then; false ends it */
     void *context;
 };
-/* Writes JOB_FILES_TEMPORARY, and says what it should be called. Errors: PEN_UNAVAILABLE (no room, or
- * not wanted any more), PEN_TOO_BIG (ARCHIVE_MOST_WEBP_BYTES), PEN_INTERNAL (a frame is damaged). */
+/* Writes JOB_FILES_TEMPORARY, and says what it should be called. Errors: PEN_UNAVAILABLE and PEN_FULL
+ * (it cannot be written, or is not wanted any more), PEN_TOO_BIG (ARCHIVE_MOST_WEBP_BYTES), PEN_INTERNAL (a frame is damaged). */
 bool archive_write(
     const struct archive_job *job, char name[JOB_NAME_BYTES], struct pen_error *error);

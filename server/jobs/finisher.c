@@ -44,7 +44,9 @@ static void finish(struct jobs *j, struct running *r)
         pen_fail(&error, PEN_UNAVAILABLE, "", "There is no room for more results of jobs.");
     for (int i = 0; fits && i < TRIES; i++) {
         error = (struct pen_error){0};
-        if (make(j, r, &error) || error.code != PEN_UNAVAILABLE || !is_wanted(r))
+        bool may_pass =
+            !make(j, r, &error) && (error.code == PEN_UNAVAILABLE || error.code == PEN_FULL);
+        if (!may_pass || !is_wanted(r))
             break;
         usleep(PAUSE_US);
     }

@@ -79,7 +79,7 @@ static struct running *recover(
     }
     job_plan_destroy(plan);
     jobs_free_running(r);
-    if (error.code == PEN_UNAVAILABLE) /* goes on at a later start */
+    if (error.code == PEN_UNAVAILABLE || error.code == PEN_FULL) /* goes on at a later start */
         return NULL;
     job.state = JOB_FAILED;
     job.error = error;

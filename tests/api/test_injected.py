@@ -1,6 +1,7 @@
 """Faults that the programs cannot make themselves, injected (faults.c): each is contained, named in
 the log, and over when its cause is."""
 import errno
+import json
 import mmap
 import os
 import struct
@@ -176,6 +177,46 @@ class Injected(unittest.TestCase):
         self.assertEqual(self.d.render(other, dict(SMALL, exposure_ev=1)).status, 200)
         self.faults.none()
         self.assertEqual(self.post(self.data).status, 201)
+
+    def test_disk_of_jobs(self):
+        """Whichever write it is that fails: the job is refused, or all of it is there in the end."""
+        scene = self.d.upload(self.data)
+        body = json.dumps({"scene": scene, **SMALL, "sequence": {"frames": 2}})
+        picture, hits, n = None, 1, 0
+        while hits and n < 60:
+            n += 1
+            self.faults.set(DAEMON, writes=n, write_errno=errno.ENOSPC, hits=0)
+            answer = self.d.call("POST", "/v1/jobs", body, {"Content-Type": "application/json"})
+            if answer.status != 202:
+                self.faults.none()
+                self.check_problem(answer, 503, 507)
+                continue
+            path = answer.headers["Location"]
+            wait(lambda: self.d.get(path).json()["state"] not in ("accepted", "running"), 60)
+            hits = self.faults.read(DAEMON, "hits")
+            self.faults.none()
+            self.assertEqual(self.d.get(path).json()["state"], "successful", n)
+            frames = [self.d.get("%s/frames/%d" % (path, i)).body for i in range(2)]
+            picture = picture or frames[0]
+            self.assertEqual(frames, [picture, picture])
+            self.assertEqual(self.d.get(path + "/result").status, 200)
+        self.assertGreater(n, 8)
+        self.assertEqual(hits, 0)
+        self.faults.set(DAEMON, writes=-1, write_errno=errno.ENOSPC)
+        self.check_problem(self.d.call("POST", "/v1/jobs", body), 503, 507)
+        self.assertEqual(self.d.render(scene, dict(SMALL, exposure_ev=1)).status, 200)
+
+    def test_disk_is_full_for_a_while(self):
+        scene = self.d.upload(self.data)
+        body = json.dumps({"scene": scene, **SMALL, "antialias": 4,
+                           "sequence": {"frames": 60, "turntable": {}}})
+        path = self.d.call("POST", "/v1/jobs", body).headers["Location"]
+        wait(lambda: self.d.get(path).json()["frames"]["done"] > 3)
+        self.faults.set(DAEMON, writes=-1, write_errno=errno.ENOSPC)
+        wait(lambda: self.faults.read(DAEMON, "hits") > 3)
+        self.faults.none()
+        wait(lambda: self.d.get(path).json()["state"] != "running", 60)
+        self.assertEqual(self.d.get(path).json()["frames"]["done"], 60)
 
     def test_importer_s_disk(self):
         self.faults.set(IMPORTER, writes=-1, write_errno=errno.ENOSPC)

@@ -16,6 +16,7 @@ struct database {
 static bool fail(struct database *d, int code, struct pen_error *error)
 {
     const char *why;
+    enum pen_code told = PEN_UNAVAILABLE;
     switch (code & 0xff) {
     case SQLITE_BUSY:
     case SQLITE_LOCKED:
@@ -31,6 +32,7 @@ static bool fail(struct database *d, int code, struct pen_error *error)
         break;
     case SQLITE_FULL:
         why = "has no room: the disk is full";
+        told = PEN_FULL;
         break;
     case SQLITE_CANTOPEN:
         why = "cannot be opened";
@@ -40,8 +42,7 @@ static bool fail(struct database *d, int code, struct pen_error *error)
     }
     log_event(LOG_ERROR, "the jobs' database %s (%s)", why,
         d && d->connection ? sqlite3_errmsg(d->connection) : sqlite3_errstr(code));
-    pen_fail(error, PEN_UNAVAILABLE, "", "The jobs' database %s.", why);
-    return false;
+    return pen_fail(error, told, "", "The jobs' database %s.", why);
 }
 
 static void see_check(void *context, const struct database_value *columns)

@@ -11,8 +11,7 @@ struct database_value {
 
 struct database;
 /* Opens or makes the SQLite database in this file, in WAL mode, and checks it. Errors, as of every
- * function here: PEN_UNAVAILABLE, saying whether it is locked, damaged, read-only, or whether the disk
- * is full. */
+ * function here: PEN_UNAVAILABLE, saying whether it is locked, damaged or read-only, and PEN_FULL. */
 struct database *database_open(const char *path, struct pen_error *error);
 void database_close(struct database *database); /* NULL is fine */
 

@@ -2,6 +2,7 @@
 #include "protocol/request.h"
 #include "server/base/file.h"
 #include "server/base/hash.h"
+#include "server/store/quota.h"
 #include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -14,10 +15,7 @@
 
 static int fail(struct pen_error *error)
 {
-    pen_fail(error, PEN_UNAVAILABLE, "", "A job's files cannot be written: %s.",
-        errno == ENOSPC || errno == EDQUOT  ? "the disk is full"
-        : errno == EROFS || errno == EACCES ? "the store is read-only"
-                                            : strerror(errno));
+    store_write_failed(errno, error);
     return -1;
 }
 

@@ -3,11 +3,11 @@
 #pragma once
 #include "server/jobs/store/job_store.h"
 
-/* The folder that holds them, made where it is missing; -1 and PEN_UNAVAILABLE. */
+/* The folder that holds them, made where it is missing; -1 and what store_write_failed says. */
 int job_files_open_root(const char *store, struct pen_error *error);
-/* A job's own folder, made where it is missing. -1 and PEN_UNAVAILABLE. */
+/* A job's own folder, in the same way. */
 int job_files_open(int root, const uint8_t id[PEN_ID_BYTES], struct pen_error *error);
-/* Writes bytes as file->name, and fills its size and tag. Errors: PEN_UNAVAILABLE. */
+/* Writes bytes as file->name, and fills its size and tag. */
 bool job_files_write(
     int folder, struct job_file *file, const void *data, size_t bytes, struct pen_error *error);
 /* What a writer of its own has put under job_files_temporary gets its name in the same way. */

@@ -58,10 +58,13 @@ bool cli_words(struct cli_args *args, const struct cli_words *words);
 int cli_render(struct cli_args *args);
 int cli_compare(struct cli_args *args);
 int cli_scenes(struct cli_args *args);
+int cli_sequence(struct cli_args *args);
+int cli_jobs(struct cli_args *args);
 int cli_techniques(struct cli_args *args);
 int cli_generate(struct cli_args *args);
 /* What "render --help" lists: every flag that comes from a parameter row. */
 void cli_render_help(void);
+void cli_sequence_help(void);
 
 /* Typed guess: true, false, a number, numbers joined by commas, else a string. */
 cJSON *cli_guess(const char *text);

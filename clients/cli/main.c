@@ -7,6 +7,8 @@
 static const char help_text[] =
     "penumbra render SCENE -o FILE    renders a scene with soft shadows\n"
     "penumbra compare SCENE           measures shadow methods against a reference\n"
+    "penumbra sequence SCENE -o OUT   renders many views of a scene: a turntable, keyframes ...\n"
+    "penumbra jobs                    lists, shows, waits for and cancels jobs of the server\n"
     "penumbra scenes                  lists, shows, uploads and deletes scenes\n"
     "penumbra techniques [NAME]       lists the shadow methods, or explains one\n"
     "penumbra generate KIND -o FILE   makes a demo or test scene\n"
@@ -31,9 +33,9 @@ int main(int argc, char **argv)
     static const struct {
         const char *name;
         int (*run)(struct cli_args *);
-    } commands[] = {{"render", cli_render}, {"compare", cli_compare}, {"scenes", cli_scenes},
-        {"techniques", cli_techniques}, {"generate", cli_generate}, {"version", version},
-        {"--version", version}};
+    } commands[] = {{"render", cli_render}, {"compare", cli_compare}, {"sequence", cli_sequence},
+        {"jobs", cli_jobs}, {"scenes", cli_scenes}, {"techniques", cli_techniques},
+        {"generate", cli_generate}, {"version", version}, {"--version", version}};
     const char *name = argc > 1 ? argv[1] : "";
     struct cli_args args = {argv, argc, 2, CLI_OK};
     if (!strcmp(name, "help") || !strcmp(name, "--help") || !strcmp(name, "-h")) {

@@ -139,7 +139,8 @@ static void tell(const struct cli_server *server, struct cli_answer *answer, con
         fprintf(stderr, "%s: %zu bytes; %s\n", path, answer->bytes, answer->timing);
 }
 
-int cli_save_image(const struct cli_server *server, struct cli_call *call, const char *path)
+int cli_save(const struct cli_server *server, struct cli_call *call, const char *path,
+    const char *kind, const char *word)
 {
     struct cli_answer answer = {0};
     bool to_stdout = !strcmp(path, "-");
@@ -150,9 +151,9 @@ int cli_save_image(const struct cli_server *server, struct cli_call *call, const
         call->sink = sink;
         status = cli_call(server, call, &answer);
     }
-    if (status == CLI_OK && strncmp(answer.type, "image/", 6))
-        status = cli_fail(CLI_SERVER, "The server's answer is %s, not an image.",
-            answer.type[0] ? answer.type : "of no type");
+    if (status == CLI_OK && strncmp(answer.type, kind, strlen(kind)))
+        status = cli_fail(CLI_SERVER, "The server's answer is %s, not %s.",
+            answer.type[0] ? answer.type : "of no type", word);
     if (sink && (to_stdout ? fflush(sink) : fclose(sink)) && status == CLI_OK)
         status = cli_fail(CLI_FAILED, "%s cannot be written.", path);
     if (status == CLI_OK && !to_stdout && rename(part, path))
@@ -164,6 +165,11 @@ int cli_save_image(const struct cli_server *server, struct cli_call *call, const
     cli_answer_finish(&answer);
     free(part);
     return status;
+}
+
+int cli_save_image(const struct cli_server *server, struct cli_call *call, const char *path)
+{
+    return cli_save(server, call, path, "image/", "an image");
 }
 
 /* Prints the record; *image is where it says that the image can be fetched, or NULL. */

@@ -1,6 +1,6 @@
 #include "clients/cli/request_args.h"
 #include "clients/cli/upload.h"
-#include "protocol/request.h"
+#include "protocol/json_sequence.h"
 #include <stdlib.h>
 #include <string.h>
 
@@ -17,7 +17,11 @@ static const struct row_set {
     {"", "output", NULL, pen_output_table, 0, 0},
     {"camera-", "camera", NULL, pen_camera_table, 0, ORBIT},
     {"orbit-", "camera", "orbit", pen_camera_table, ORBIT, 0},
+    /* From here on of sequences only. */
+    {"", "sequence", NULL, pen_sequence_table, 0, 0},
+    {"turntable-", "sequence", "turntable", pen_turntable_table, 0, 0},
 };
+#define REQUEST_SETS 5
 #define ROW_SETS (sizeof row_sets / sizeof *row_sets)
 
 static bool is_in(const struct row_set *set, const struct pen_param *row)
@@ -78,9 +82,9 @@ static cJSON *row_value(
     return cli_guess(text);
 }
 
-static bool row_option(struct cli_args *args, cJSON *root)
+static bool row_option(struct cli_args *args, cJSON *root, size_t first, size_t end)
 {
-    for (size_t s = 0; s < ROW_SETS; s++) {
+    for (size_t s = first; s < end; s++) {
         struct pen_param_table table = row_sets[s].table();
         for (uint32_t r = 0; r < table.count; r++) {
             const struct pen_param *row = &table.rows[r];
@@ -224,7 +228,12 @@ bool cli_request_option(struct cli_args *args, cJSON *root)
         return true;
     }
     return set_option(args, root) || light_option(args, root) || json_option(args, root) ||
-           row_option(args, root);
+           row_option(args, root, 0, REQUEST_SETS);
+}
+
+bool cli_sequence_option(struct cli_args *args, cJSON *root)
+{
+    return row_option(args, root, REQUEST_SETS, ROW_SETS) || cli_request_option(args, root);
 }
 
 bool cli_request_has(const cJSON *root, const char *group, const char *key)
@@ -256,14 +265,25 @@ static void print_row(const struct row_set *set, const struct pen_param *row)
     printf("  %-34s %s%s%s%s\n", usage, row->help, *range ? " (" : "", range, *range ? ")" : "");
 }
 
-void cli_render_help(void)
+static void print_rows(size_t first, size_t end)
 {
-    for (size_t s = 0; s < ROW_SETS; s++) {
+    for (size_t s = first; s < end; s++) {
         struct pen_param_table table = row_sets[s].table();
         for (uint32_t r = 0; r < table.count; r++)
             if (is_in(&row_sets[s], &table.rows[r]))
                 print_row(&row_sets[s], &table.rows[r]);
     }
+}
+
+void cli_sequence_help(void)
+{
+    print_rows(REQUEST_SETS, ROW_SETS);
+    cli_render_help();
+}
+
+void cli_render_help(void)
+{
+    print_rows(0, REQUEST_SETS);
     puts("\nKeys of --light, besides type and texture (a pattern, an id or a file):");
     struct pen_param_table table = pen_light_table();
     for (uint32_t r = 0; r < table.count; r++)

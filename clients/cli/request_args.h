@@ -5,5 +5,7 @@
 /* Consumes one flag that shapes the request: --technique, --set, --light, --json and one per
  * parameter row. `root` is the request body so far. */
 bool cli_request_option(struct cli_args *args, cJSON *root);
+/* The same, and what only sequences have. */
+bool cli_sequence_option(struct cli_args *args, cJSON *root);
 /* True when the body has `key`, at the top or inside the object `group`. */
 bool cli_request_has(const cJSON *root, const char *group, const char *key);

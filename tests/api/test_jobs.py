@@ -1,7 +1,10 @@
 """Jobs: renders that nobody waits for, and sequences of many views."""
 import io
+import json
 import os
 import struct
+import subprocess
+import tempfile
 import unittest
 import zipfile
 
@@ -318,6 +321,42 @@ class Jobs(unittest.TestCase):
         ended(self.d, first.json()["id"])
         self.d.call("DELETE", first.headers["Location"])
         self.assertEqual(post(self.d, "/v1/jobs", body, Idempotency_Key="one").status, 202)
+
+    # ---- the command-line client ----
+
+    def penumbra(self, *arguments):
+        run = subprocess.run([os.path.join(harness.BIN, "penumbra"), *arguments, "--server",
+                              "http://127.0.0.1:%d" % self.d.port], capture_output=True, text=True)
+        return run.returncode, run.stdout, run.stderr
+
+    def test_cli(self):
+        small = ["sequence", self.scene, "--technique", "hard", "--width", "24", "--height", "16",
+                 "--frames", "5", "--turntable-elevation-deg", "20"]
+        with tempfile.TemporaryDirectory() as folder:
+            out = os.path.join(folder, "frames")
+            self.assertEqual(self.penumbra(*small, "-o", out)[0], 0)
+            frames = []
+            for name in sorted(os.listdir(out)):
+                with open(os.path.join(out, name), "rb") as file:
+                    frames.append(file.read())
+            self.assertEqual(len(frames), 5)
+            view = {**TINY, "camera": {"orbit": {"azimuth_deg": 72, "elevation_deg": 20}}}
+            self.assertEqual(frames[1], self.d.render(self.scene, view).body)
+            self.assertEqual(self.penumbra(*small, "-o", out + ".zip")[0], 0)
+            with zipfile.ZipFile(out + ".zip") as archive:
+                self.assertEqual([archive.read(n) for n in archive.namelist()], frames)
+            self.assertEqual(self.penumbra(*small, "-o", out + ".webp")[0], 0)
+            with open(out + ".webp", "rb") as file:
+                self.assertEqual(len(animation(file.read())), 5)
+        status, id, _ = self.penumbra(*small, "--detach")
+        self.assertEqual((status, len(id.strip())), (0, 64))
+        self.assertIn("5 of      5 frames", self.penumbra("jobs", "wait", id.strip())[1])
+        self.assertIn(id.strip(), self.penumbra("jobs")[1])
+        self.assertEqual(json.loads(self.penumbra("jobs", "show", id.strip())[1])["id"], id.strip())
+        self.assertEqual(self.penumbra("jobs", "cancel", id.strip())[0], 0)
+        self.assertEqual(self.penumbra("jobs", "show", id.strip())[0], 3)
+        self.assertEqual(self.penumbra("sequence", self.scene)[0], 2)
+        self.assertEqual(self.penumbra("sequence", self.scene, "--frames", "x", "--detach")[0], 2)
 
     # ---- what there is ----
 

@@ -21,6 +21,11 @@
 
 #define STRAGGLER_MS 200 /* requests on their way when the last answer is out */
 #define CANCEL_MS 10000
+/* Descriptors that public connections leave to the rest of the daemon, and those that each listener
+ * keeps for when there are no more: a request takes three. */
+#define SPARE_DESCRIPTORS 16
+#define PUBLIC_SPARES 1
+#define ADMIN_SPARES 6
 #define PART_CACHE_BYTES                                                                           \
     (64u << 20) /* links to pictures that get better hold as long as they fit */
 
@@ -123,20 +128,6 @@ static bool name_build(const char *worker_path, struct pen_error *error)
     return true;
 }
 
-#define MAX_PEM_BYTES (1 << 18)
-
-static char *read_file(const char *path, struct pen_error *error)
-{
-    size_t bytes;
-    int fd = open(path, O_RDONLY | O_CLOEXEC);
-    char *text = fd >= 0 ? file_read(fd, MAX_PEM_BYTES, &bytes) : NULL;
-    if (!text)
-        pen_fail(error, PEN_UNAVAILABLE, "", "%.200s cannot be read.", path);
-    if (fd >= 0)
-        close(fd);
-    return text;
-}
-
 static bool is_loopback(const char *listen_on)
 {
     return !strncmp(listen_on, "127.", 4) || !strncmp(listen_on, "[::1]", 5) ||
@@ -185,7 +176,7 @@ static bool start_importer(struct service *s, struct pen_error *error)
     const struct config *c = s->config;
     struct importer_config config = {.store = s->store,
         .processes = (uint32_t)c->imports,
-        .queue_limit = (uint32_t)c->uploads,
+        .queue_limit = 2 * (uint32_t)c->uploads,
         .timeout_ms = c->import_timeout_ms,
         .memory_bytes = c->import_memory.bytes,
         .cpu_seconds = c->import_cpu_seconds};
@@ -257,12 +248,18 @@ static void start_jobs(struct service *s)
 static bool start_listeners(struct service *s, struct pen_error *error)
 {
     const struct config *c = s->config;
+    struct tls_identity *tls = NULL;
+    if (*c->tls_cert && !(tls = tls_identity_load(c->tls_cert, c->tls_key, error)))
+        return false;
     struct http_config public = {.callbacks = &routes_callbacks,
         .context = s,
         .threads = (uint32_t)c->http_threads,
-        .cert_pem = s->cert_pem,
-        .key_pem = s->key_pem,
-        .door = {.listen = c->listen,
+        .door = {.name = "public",
+            .listen = c->listen,
+            .tls = tls,
+            .spares = PUBLIC_SPARES,
+            .margin = SPARE_DESCRIPTORS,
+            .uploads = (uint32_t)c->uploads,
             .connections = (uint32_t)c->connections,
             .connections_per_address = (uint32_t)c->connections_per_address,
             .header_timeout_ms = c->header_timeout_ms,
@@ -271,7 +268,9 @@ static bool start_listeners(struct service *s, struct pen_error *error)
     struct http_config admin = {.callbacks = &routes_admin_callbacks,
         .context = s,
         .threads = 1,
-        .door = {.listen = c->admin_listen,
+        .door = {.name = "admin",
+            .listen = c->admin_listen,
+            .spares = ADMIN_SPARES,
             .connections = 64,
             .connections_per_address = 64,
             .header_timeout_ms = 5000,
@@ -301,9 +300,7 @@ struct service *service_create(
             "Beyond loopback --token-file is needed, or --insecure if that is meant.");
         goto fail;
     }
-    if ((*config->token_file && !(s->auth = auth_load(config->token_file, error))) ||
-        (*config->tls_cert && (!(s->cert_pem = read_file(config->tls_cert, error)) ||
-                                  !(s->key_pem = read_file(config->tls_key, error)))))
+    if (*config->token_file && !(s->auth = auth_load(config->token_file, error)))
         goto fail;
     s->openapi = pen_openapi_json(catalogue, PENUMBRA_VERSION);
     struct hash *hash = hash_create();
@@ -398,8 +395,6 @@ void service_destroy(struct service *s, const bool *hurry)
     auto_runs_destroy(s->auto_runs);
     auth_destroy(s->auth);
     free(s->openapi);
-    free(s->cert_pem);
-    free(s->key_pem);
     pthread_mutex_destroy(&s->canary_lock);
     free(s);
 }

@@ -1,7 +1,8 @@
 #include "server/http/http.h"
 #include "protocol/memory.h"
 #include "server/base/clock.h"
-#include "server/http/status.h"
+#include "server/base/request_id.h"
+#include "server/base/status.h"
 #include <arpa/inet.h>
 #include <ctype.h>
 #include <errno.h>
@@ -32,112 +33,9 @@ struct http_listener {
     bool draining;   /* atomic */
 };
 
-static void fill_request_id(char text[33])
-{
-    uint8_t random[16];
-    if (getrandom(random, sizeof random, 0) != sizeof random)
-        abort();
-    for (int i = 0; i < 16; i++)
-        snprintf(text + 2 * i, 3, "%02x", random[i]);
-}
-
-/* ---- the header: what libmicrohttpd lets through and we do not ---- */
-
-struct framing {
-    uint32_t lengths, encodings, hosts, count;
-    uint64_t length;
-    bool chunked;
-    const char *fault;
-};
-
-static bool is_token(const char *text, size_t bytes)
-{
-    for (size_t i = 0; i < bytes; i++)
-        if (!isalnum((unsigned char)text[i]) && !strchr("!#$%&'*+-.^_`|~", text[i]))
-            return false;
-    return bytes > 0;
-}
-
-/* A value on a line of its own (RFC 9112, 5.2: refuse it). libmicrohttpd refuses those itself since
- * 0.9.77; before, it joins the lines in a copy, so that the value no longer lies behind its name. */
-static bool is_folded(const char *name, size_t name_bytes, const char *value)
-{
-#if MHD_VERSION < 0x00097701
-    const char *after = name + name_bytes + 1;
-    while (after != value && (*after == ' ' || *after == '\t'))
-        after++;
-    return after != value;
-#else
-    (void)name, (void)name_bytes, (void)value;
-    return false;
-#endif
-}
-
-static enum MHD_Result look_at_header(void *context, enum MHD_ValueKind kind, const char *name,
-    size_t name_bytes, const char *value, size_t value_bytes)
-{
-    (void)kind;
-    struct framing *f = context;
-    f->count++;
-    if (!is_token(name, name_bytes))
-        f->fault = "A header has an invalid name.";
-    if (is_folded(name, name_bytes, value))
-        f->fault = "A header goes on in a second line.";
-    for (size_t i = 0; i < value_bytes; i++)
-        if (((unsigned char)value[i] < 0x20 && value[i] != '\t') || value[i] == 0x7f)
-            f->fault = "A header has a control character in its value.";
-    if (name_bytes == 14 && !strncasecmp(name, "Content-Length", 14)) {
-        f->lengths++;
-        f->length = 0;
-        if (value_bytes == 0 || value_bytes > 18)
-            f->fault = "Content-Length is not a number.";
-        for (size_t i = 0; i < value_bytes && !f->fault; i++) {
-            if (!isdigit((unsigned char)value[i]))
-                f->fault = "Content-Length is not a number.";
-            f->length = f->length * 10 + (uint64_t)(value[i] - '0');
-        }
-    } else if (name_bytes == 17 && !strncasecmp(name, "Transfer-Encoding", 17)) {
-        f->encodings++;
-        f->chunked = value_bytes == 7 && !strncasecmp(value, "chunked", 7);
-        if (!f->chunked)
-            f->fault = "The only transfer coding is chunked.";
-    } else if (name_bytes == 4 && !strncasecmp(name, "Host", 4)) {
-        f->hosts++;
-    }
-    return MHD_YES;
-}
-
-static bool check_framing(struct http_exchange *x, const char *version, struct pen_error *error)
-{
-    struct framing f = {0};
-    MHD_get_connection_values_n(x->connection, MHD_HEADER_KIND, look_at_header, &f);
-    bool http11 = !strcmp(version, "HTTP/1.1");
-    if (!f.fault && !http11 && strcmp(version, "HTTP/1.0"))
-        f.fault = "The HTTP version is not supported.";
-    if (!f.fault && f.lengths > 1)
-        f.fault = "There is more than one Content-Length.";
-    if (!f.fault && f.encodings && (f.lengths || f.encodings > 1 || !http11))
-        f.fault = "The length of the body is ambiguous.";
-    if (!f.fault && (f.hosts > 1 || (http11 && f.hosts == 0)))
-        f.fault = "There must be exactly one Host.";
-    bool can_have_body =
-        !strcmp(x->method, "POST") || !strcmp(x->method, "PUT") || !strcmp(x->method, "PATCH");
-    if (!f.fault && !can_have_body && (f.chunked || f.length))
-        f.fault = "This method has no body.";
-    x->content_length = f.chunked ? HTTP_UNKNOWN_LENGTH : f.length;
-    if (f.fault)
-        return pen_fail(error, PEN_MALFORMED, "", "%s", f.fault);
-    return true;
-}
-
 /* Splits the raw request target; refuses what no route could mean. */
 static bool check_target(struct http_exchange *x, struct pen_error *error)
 {
-    for (const char *c = x->path; *c; c++)
-        if (*c <= 0x20 || *c >= 0x7f || *c == '#')
-            return pen_fail(error, PEN_MALFORMED, "", "The request target is malformed.");
-    if (strlen(x->path) > HTTP_MAX_TARGET)
-        return pen_fail(error, PEN_URI_TOO_LONG, "", "The request target is too long.");
     for (const char *scheme = "http://"; scheme; scheme = scheme[4] == ':' ? "https://" : NULL) {
         size_t n = strlen(scheme);
         if (!strncasecmp(x->path, scheme, n)) { /* the form that proxies use */
@@ -156,12 +54,22 @@ static bool check_target(struct http_exchange *x, struct pen_error *error)
     return true;
 }
 
-/* ---- answering ---- */
-
 const char *http_header(const struct http_exchange *x, const char *name)
 {
     return MHD_lookup_connection_value(x->connection, MHD_HEADER_KIND, name);
 }
+
+/* How long the body is; what the header says of it was judged before. False: there is none. */
+static bool read_length(struct http_exchange *x)
+{
+    const char *length = http_header(x, "Content-Length");
+    x->content_length = http_header(x, "Transfer-Encoding") ? HTTP_UNKNOWN_LENGTH
+                        : length                            ? strtoull(length, NULL, 10)
+                                                            : 0;
+    return x->content_length != 0;
+}
+
+/* ---- answering ---- */
 
 void http_add_header(struct http_exchange *x, const char *name, const char *format, ...)
 {
@@ -202,20 +110,19 @@ void http_answer_file(
     http_answer(x, status, content_type, (struct http_body){.size = file.bytes});
 }
 
+void http_takes_place(const struct http_exchange *x)
+{
+    door_note(x->listener->door, x->fd, LINK_UPLOADS);
+}
+
 void http_sleep(struct http_exchange *x)
 {
-    door_set(x->listener->door, x->fd, DOOR_BUSY, 0);
     MHD_suspend_connection(x->connection);
 }
 
 void http_wake(struct http_exchange *x)
 {
     MHD_resume_connection(x->connection);
-}
-
-void http_expect(struct http_exchange *x, uint64_t bytes)
-{
-    door_set(x->listener->door, x->fd, DOOR_SENDING, bytes);
 }
 
 void http_defer(struct http_exchange *x)
@@ -262,10 +169,12 @@ static ssize_t read_stream(void *context, uint64_t position, char *to, size_t mo
                                    : MHD_CONTENT_READER_END_WITH_ERROR;
 }
 
-/* What a slow client has not read must not pile up in the kernel; 0: as much as usual. */
-static void limit_unsent(struct http_exchange *x, int bytes)
+/* What a slow client has not read must not pile up on its way. */
+static void limit_unsent(struct http_exchange *x)
 {
-    setsockopt(x->fd, IPPROTO_TCP, TCP_NOTSENT_LOWAT, &bytes, sizeof bytes);
+    int bytes = STREAM_UNSENT;
+    setsockopt(x->fd, SOL_SOCKET, SO_SNDBUF, &bytes, sizeof bytes);
+    door_note(x->listener->door, x->fd, LINK_STREAMS);
 }
 
 static struct MHD_Response *make_response(struct http_exchange *x)
@@ -282,7 +191,7 @@ static struct MHD_Response *make_response(struct http_exchange *x)
     if (!x->stream.read) /* released in completed() */
         return MHD_create_response_from_buffer(
             x->body.size, (void *)x->body.data, MHD_RESPMEM_PERSISTENT);
-    limit_unsent(x, STREAM_UNSENT);
+    limit_unsent(x);
     return MHD_create_response_from_callback(MHD_SIZE_UNKNOWN, STREAM_BLOCK, read_stream, x, NULL);
 }
 
@@ -297,10 +206,11 @@ static enum MHD_Result queue(struct http_exchange *x)
     for (uint32_t i = 0; i < x->header_count; i++)
         complete = complete && MHD_add_response_header(
                                    response, x->headers[i].name, x->headers[i].value) == MHD_YES;
-    if (x->closes || is_draining(listener))
+    if (x->closes || is_draining(listener)) {
         MHD_add_response_header(response, "Connection", "close");
+        door_note(listener->door, x->fd, LINK_CLOSES);
+    }
     x->queued = true;
-    door_set(listener->door, x->fd, DOOR_SENDING, x->body.size);
     enum MHD_Result result =
         complete ? MHD_queue_response(x->connection, x->status, response) : MHD_NO;
     MHD_destroy_response(response);
@@ -311,22 +221,18 @@ static enum MHD_Result queue(struct http_exchange *x)
  * the connection ends. */
 static enum MHD_Result break_off(struct http_exchange *x)
 {
-    struct http_listener *listener = x->listener;
-    if (listener->config.door.plain) {
-        char head[4096];
-        int n = snprintf(head, sizeof head,
-            "HTTP/1.1 %u %s\r\nConnection: close\r\nContent-Length: %zu\r\n", x->status,
-            http_status_title(x->status), x->body.size);
-        for (uint32_t i = 0; i < x->header_count && n < (int)sizeof head - 700; i++)
-            n += snprintf(head + n, sizeof head - (size_t)n, "%s: %s\r\n", x->headers[i].name,
-                x->headers[i].value);
-        n += snprintf(head + n, sizeof head - (size_t)n, "\r\n");
-        struct iovec parts[] = {{head, (size_t)n}, {(void *)x->body.data, x->body.size}};
-        struct msghdr message = {.msg_iov = parts, .msg_iovlen = 2};
-        if (sendmsg(x->fd, &message, MSG_DONTWAIT | MSG_NOSIGNAL) < 0)
-            x->aborted = true;
-        door_linger(listener->door, x->fd);
-    }
+    char head[4096];
+    int n = snprintf(head, sizeof head,
+        "HTTP/1.1 %u %s\r\nConnection: close\r\nContent-Length: %zu\r\n", x->status,
+        http_status_title(x->status), x->body.size);
+    for (uint32_t i = 0; i < x->header_count && n < (int)sizeof head - 700; i++)
+        n += snprintf(head + n, sizeof head - (size_t)n, "%s: %s\r\n", x->headers[i].name,
+            x->headers[i].value);
+    n += snprintf(head + n, sizeof head - (size_t)n, "\r\n");
+    struct iovec parts[] = {{head, (size_t)n}, {(void *)x->body.data, x->body.size}};
+    struct msghdr message = {.msg_iov = parts, .msg_iovlen = 2};
+    if (sendmsg(x->fd, &message, MSG_DONTWAIT | MSG_NOSIGNAL) < 0)
+        x->aborted = true;
     x->queued = true;
     return MHD_NO;
 }
@@ -342,56 +248,49 @@ static void *on_target(void *context, const char *target, struct MHD_Connection 
     x->listener = listener;
     x->connection = connection;
     x->fd = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD)->connect_fd;
-    door_set(listener->door, x->fd, DOOR_HEADER, 0);
     return x;
 }
 
-static enum MHD_Result begin(struct http_exchange *x, const char *method, const char *version)
+static enum MHD_Result begin(struct http_exchange *x, const char *method)
 {
     struct http_listener *listener = x->listener;
     const struct http_callbacks *callbacks = listener->config.callbacks;
-    struct pen_error framing = {0};
+    struct pen_error fault = {0};
     const struct sockaddr *address =
         MHD_get_connection_info(x->connection, MHD_CONNECTION_INFO_CLIENT_ADDRESS)->client_addr;
     x->begun = true;
     x->method = method;
     x->header_ns = x->body_ns = clock_now_ns();
-    fill_request_id(x->request_id);
+    request_id_make(x->request_id);
     if (!address || getnameinfo(address,
                         address->sa_family == AF_INET6 ? sizeof(struct sockaddr_in6)
                                                        : sizeof(struct sockaddr_in),
                         x->client, sizeof x->client, NULL, 0, NI_NUMERICHOST))
         strcpy(x->client, "unknown");
     __atomic_add_fetch(&listener->active, 1, __ATOMIC_ACQ_REL);
-    bool ok = check_framing(x, version, &framing) && check_target(x, &framing);
-    bool has_body = x->content_length != 0;
-    door_set(listener->door, x->fd, has_body ? DOOR_BODY : DOOR_BUSY, 0);
-    if (!ok) {
-        x->closes = true; /* what follows on this connection cannot be told apart */
-        door_linger(listener->door, x->fd);
-    }
-    callbacks->begin(x, &framing);
+    bool has_body = read_length(x);
+    bool ok = check_target(x, &fault);
+    x->closes = !ok;
+    callbacks->begin(x, &fault);
     if (!x->answered || !has_body)
         return x->answered && x->closes ? queue(x) : MHD_YES;
     /* Refused with a body to come. A small one is read first, so that the connection lives on. */
     if (ok && x->content_length <= SWALLOW_BYTES && !http_header(x, "Expect"))
         return MHD_YES;
     x->closes = true;
-    door_linger(listener->door, x->fd);
     return queue(x);
 }
 
 static enum MHD_Result on_request(void *context, struct MHD_Connection *connection, const char *url,
     const char *method, const char *version, const char *data, size_t *bytes, void **user)
 {
-    (void)context, (void)url, (void)connection;
+    (void)context, (void)url, (void)connection, (void)version;
     struct http_exchange *x = *user;
     const struct http_callbacks *callbacks = x->listener->config.callbacks;
     if (!x->begun)
-        return begin(x, method, version);
+        return begin(x, method);
     if (*bytes) {
         x->received += *bytes;
-        door_received(x->listener->door, x->fd, *bytes);
         if (!x->answered) {
             callbacks->body(x, data, *bytes);
             if (x->answered)
@@ -403,7 +302,6 @@ static enum MHD_Result on_request(void *context, struct MHD_Connection *connecti
     if (!x->body_done) {
         x->body_done = true;
         x->body_ns = clock_now_ns();
-        door_set(x->listener->door, x->fd, DOOR_BUSY, 0);
         if (!x->answered) {
             callbacks->end(x);
             if (x->deferred)
@@ -430,9 +328,7 @@ static void on_completed(void *context, struct MHD_Connection *connection, void 
         if (x->file.fd > 0) /* nobody was left to send it to */
             close(x->file.fd);
     }
-    if (x->stream.read)
-        limit_unsent(x, 0);
-    door_set(listener->door, x->fd, DOOR_WAITING, 0);
+    door_note(listener->door, x->fd, LINK_DONE);
     if (x->begun)
         __atomic_sub_fetch(&listener->active, 1, __ATOMIC_ACQ_REL);
     free(x->path);
@@ -466,47 +362,28 @@ struct http_listener *http_listener_create(
 {
     struct http_listener *listener = pen_alloc_zero(1, sizeof *listener);
     listener->config = *config;
-    bool tls = config->cert_pem != NULL;
     struct door_config *door = &listener->config.door;
-    door->plain = !tls;
     door->on_socket = on_socket;
     door->context = listener;
     /* libmicrohttpd's own limit is divided among its threads and silent: ours comes long before. */
     unsigned limit = (door->connections + LINGER_SPARE) * config->threads;
     unsigned flags = MHD_USE_EPOLL_INTERNAL_THREAD | MHD_USE_NO_LISTEN_SOCKET |
-                     MHD_ALLOW_SUSPEND_RESUME | MHD_USE_ITC | MHD_USE_ERROR_LOG |
-                     (tls ? MHD_USE_TLS : 0);
-    struct MHD_OptionItem tls_options[] = {
-        {MHD_OPTION_HTTPS_MEM_CERT, 0, config->cert_pem},
-        {MHD_OPTION_HTTPS_MEM_KEY, 0, config->key_pem},
-        {MHD_OPTION_END, 0, NULL},
-    };
+                     MHD_ALLOW_SUSPEND_RESUME | MHD_USE_ITC | MHD_USE_ERROR_LOG;
     struct MHD_OptionItem pool_options[] = {
         {MHD_OPTION_THREAD_POOL_SIZE, config->threads, NULL},
         {MHD_OPTION_END, 0, NULL},
     };
     struct MHD_OptionItem none[] = {{MHD_OPTION_END, 0, NULL}};
-    /* What it lets through is checked in on_request, with answers that say what is wrong. Since
-     * 0.9.77 the old option's -1 means "beyond the RFCs": "Content-Length : 2" would be a length. */
-#if MHD_VERSION >= 0x00097701
-    struct MHD_OptionItem discipline[] = {
-        {MHD_OPTION_CLIENT_DISCIPLINE_LVL, 1, NULL}, {MHD_OPTION_END, 0, NULL}};
-#else
-    struct MHD_OptionItem discipline[] = {
-        {MHD_OPTION_STRICT_FOR_CLIENT, -1, NULL}, {MHD_OPTION_END, 0, NULL}};
-#endif
     listener->daemon = MHD_start_daemon(flags, 0, NULL, NULL, on_request, listener,
         MHD_OPTION_EXTERNAL_LOGGER, no_log, NULL, MHD_OPTION_URI_LOG_CALLBACK, on_target, listener,
         MHD_OPTION_NOTIFY_COMPLETED, on_completed, listener, MHD_OPTION_NOTIFY_CONNECTION,
         on_connection, listener, MHD_OPTION_CONNECTION_LIMIT, limit,
         MHD_OPTION_CONNECTION_MEMORY_LIMIT, (size_t)CONNECTION_MEMORY,
-        MHD_OPTION_CONNECTION_TIMEOUT, 0u, MHD_OPTION_ARRAY, discipline, MHD_OPTION_ARRAY,
-        config->threads > 1 ? pool_options : none, MHD_OPTION_ARRAY, tls ? tls_options : none,
-        MHD_OPTION_END);
+        MHD_OPTION_CONNECTION_TIMEOUT, 0u, MHD_OPTION_ARRAY,
+        config->threads > 1 ? pool_options : none, MHD_OPTION_END);
     if (!listener->daemon) {
-        pen_fail(error, PEN_UNAVAILABLE, "",
-            tls ? "The TLS listener cannot start: are certificate and key valid PEM?"
-                : "The HTTP listener cannot start.");
+        pen_fail(error, PEN_UNAVAILABLE, "", "The HTTP listener cannot start.");
+        tls_identity_destroy(door->tls);
         free(listener);
         return NULL;
     }
@@ -532,7 +409,10 @@ struct door *http_listener_door(const struct http_listener *listener)
 
 uint32_t http_listener_active(const struct http_listener *listener)
 {
-    return __atomic_load_n(&listener->active, __ATOMIC_ACQUIRE);
+    struct door_numbers numbers;
+    uint32_t active = __atomic_load_n(&listener->active, __ATOMIC_ACQUIRE);
+    door_read(listener->door, &numbers);
+    return active > numbers.engaged ? active : numbers.engaged;
 }
 
 void http_listener_drain(struct http_listener *listener)

@@ -2,9 +2,9 @@
  * request and its answer. Callbacks run on the listener's threads and must not block for long. */
 #pragma once
 #include "protocol/error.h"
-#include "server/http/door.h"
+#include "server/base/request_id.h"
+#include "server/wire/door.h"
 
-#define HTTP_MAX_TARGET 8192
 #define HTTP_MAX_HEADERS 16
 #define HTTP_UNKNOWN_LENGTH UINT64_MAX
 
@@ -46,7 +46,7 @@ struct http_exchange {
     char *path;      /* as sent, up to '?'; nothing decoded */
     char *query;     /* as sent, behind '?', or NULL */
     char client[64]; /* numeric address */
-    char request_id[33];
+    char request_id[REQUEST_ID_BYTES];
     uint64_t content_length;     /* 0: no body, HTTP_UNKNOWN_LENGTH: chunked */
     uint64_t header_ns, body_ns; /* when the header and the body were complete */
     void *user;                  /* the owner's */
@@ -66,9 +66,9 @@ struct http_exchange {
 };
 
 struct http_callbacks {
-    /* The header is complete. `framing` is filled when the request must be refused and the
-     * connection closed: then it must be answered here. Otherwise it may be answered here. */
-    void (*begin)(struct http_exchange *exchange, const struct pen_error *framing);
+    /* The header is complete. `fault` is filled when the request must be refused and the connection
+     * closed: then it must be answered here. Otherwise it may be answered here. */
+    void (*begin)(struct http_exchange *exchange, const struct pen_error *fault);
     /* A piece of the body; answering here ends the request. */
     void (*body)(struct http_exchange *exchange, const void *data, size_t bytes);
     /* The body is complete: must answer or defer. */
@@ -79,23 +79,26 @@ struct http_callbacks {
 };
 
 struct http_config {
-    struct door_config door; /* plain, on_socket and context are filled in */
+    struct door_config door; /* on_socket and context are filled in */
     const struct http_callbacks *callbacks;
     void *context;
     uint32_t threads;
-    char *cert_pem, *key_pem; /* both NULL: no TLS; must outlive the listener */
 };
 
 struct http_listener *http_listener_create(
     const struct http_config *config, struct pen_error *error);
 void *http_listener_context(const struct http_listener *listener);
 struct door *http_listener_door(const struct http_listener *listener);
-/* Exchanges between `begin` and `completed`. */
+/* Requests that are not answered to the last byte. */
 uint32_t http_listener_active(const struct http_listener *listener);
 /* Accepts no new connection; every answer from now on closes its connection. */
 void http_listener_drain(struct http_listener *listener);
 /* Nothing may be deferred any more. */
 void http_listener_destroy(struct http_listener *listener);
+
+/* The body takes up a place: while more of them come than the door has for that (door_config.uploads),
+ * those that come slowly are ended. */
+void http_takes_place(const struct http_exchange *exchange);
 
 /* A header of the request, or NULL. */
 const char *http_header(const struct http_exchange *exchange, const char *name);
@@ -116,8 +119,6 @@ void http_answer_file(struct http_exchange *exchange, uint32_t status, const cha
  * more until http_wake, from any thread, once. */
 void http_sleep(struct http_exchange *exchange);
 void http_wake(struct http_exchange *exchange);
-/* Inside `read`: from here on `bytes` follow without a pause, for which the client has its time. */
-void http_expect(struct http_exchange *exchange, uint64_t bytes);
 /* The answer comes later, from http_answer. Only inside `end`, and before the work is handed to
  * another thread; the exchange must not be touched afterwards by the caller. */
 void http_defer(struct http_exchange *exchange);

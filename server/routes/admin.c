@@ -2,7 +2,7 @@
 #include "protocol/memory.h"
 #include "server/base/clock.h"
 #include "server/base/log.h"
-#include "server/http/status.h"
+#include "server/base/status.h"
 #include "server/routes/routes.h"
 #include <stdio.h>
 #include <stdlib.h>
@@ -214,6 +214,11 @@ static void write_service(struct service *s, struct metrics_text *text)
             (double)door.refused},
         {"penumbra_connections_too_slow_total", "counter", "Connections ended as too slow.",
             (double)door.too_slow},
+        {"penumbra_connections_displaced_total", "counter",
+            "Of these and of idle ones, those that others needed the place of.",
+            (double)door.displaced},
+        {"penumbra_requests_malformed_total", "counter", "Requests that were no HTTP.",
+            (double)door.malformed},
         {"penumbra_received_bytes_total", "counter", "Request bodies.",
             (double)__atomic_load_n(&s->bytes_received, __ATOMIC_RELAXED)},
         {"penumbra_sent_bytes_total", "counter", "Answer bodies.",
@@ -233,11 +238,12 @@ static void metrics_page(struct http_exchange *x, struct service *s)
 
 /* ---- callbacks ---- */
 
-static void begin(struct http_exchange *x, const struct pen_error *framing)
+static void begin(struct http_exchange *x, const struct pen_error *fault)
 {
     bool get = !strcmp(x->method, "GET") || !strcmp(x->method, "HEAD");
-    if (framing->code != PEN_OK) {
-        answer_text(x, http_status_of(framing->code).status, "The request is malformed.\n");
+    if (fault->code != PEN_OK) {
+        http_answer(x, http_status_of(fault->code).status, "application/problem+json",
+            http_text(http_problem(fault, x->request_id)));
     } else if (!get) {
         http_add_header(x, "Allow", "GET, HEAD");
         answer_text(x, 405, "This listener takes GET and HEAD.\n");

@@ -93,10 +93,27 @@ static bool open_upload(struct call_body *body, struct service *s, enum pen_body
     if (!read_entry(x, takes, entry, error))
         return false;
     body->has_place = true;
-    if (__atomic_add_fetch(&s->uploads, 1, __ATOMIC_ACQ_REL) > s->config->uploads)
+    /* As many again as there are places: until those that keep one for little have left it. */
+    if (__atomic_add_fetch(&s->uploads, 1, __ATOMIC_ACQ_REL) > 2 * s->config->uploads)
         return pen_fail(error, PEN_UNAVAILABLE, "", "Too many uploads are under way.");
+    http_takes_place(x);
     body->upload = upload_create(s->store, type, entry, limit, error);
     return body->upload != NULL;
+}
+
+/* Content-Encoding: none, or gzip. */
+static bool read_coding(
+    struct call_body *body, const struct http_exchange *x, struct pen_error *error)
+{
+    const char *coding = http_header(x, "Content-Encoding");
+    if (!coding || !strcasecmp(coding, "identity"))
+        return true;
+    body->unknown_coding = strcasecmp(coding, "gzip") && strcasecmp(coding, "x-gzip");
+    if (body->unknown_coding)
+        return pen_fail(error, PEN_UNKNOWN_TYPE, "",
+            "Of content codings only gzip is read here, not \"%.40s\".", coding);
+    body->gunzip = gunzip_create();
+    return true;
 }
 
 bool body_open(struct call_body *body, struct service *service, enum pen_body takes,
@@ -105,6 +122,8 @@ bool body_open(struct call_body *body, struct service *service, enum pen_body ta
     const char *type = http_header(x, "Content-Type");
     if (takes == PEN_BODY_NONE)
         return true;
+    if (!read_coding(body, x, error))
+        return false;
     if (pen_upload_types(takes)) {
         bool ok = open_upload(body, service, takes, x, type, error);
         if (!ok && error->code != PEN_FULL) /* time does not mend that */
@@ -116,8 +135,9 @@ bool body_open(struct call_body *body, struct service *service, enum pen_body ta
     return !is_longer(x, PEN_MAX_JSON_BYTES) || too_long(error);
 }
 
-bool body_add(struct call_body *body, const void *data, size_t bytes, struct pen_error *error)
+static bool take(void *context, const void *data, size_t bytes, struct pen_error *error)
 {
+    struct call_body *body = context;
     if (body->upload)
         return upload_add(body->upload, data, bytes, error);
     if (body->text_bytes + bytes > PEN_MAX_JSON_BYTES)
@@ -128,11 +148,23 @@ bool body_add(struct call_body *body, const void *data, size_t bytes, struct pen
     return true;
 }
 
+bool body_add(struct call_body *body, const void *data, size_t bytes, struct pen_error *error)
+{
+    return body->gunzip ? gunzip_add(body->gunzip, data, bytes, take, body, error)
+                        : take(body, data, bytes, error);
+}
+
+bool body_end(struct call_body *body, struct pen_error *error)
+{
+    return !body->gunzip || gunzip_end(body->gunzip, error);
+}
+
 void body_finish(struct call_body *body, struct service *service)
 {
     if (body->has_place)
         __atomic_sub_fetch(&service->uploads, 1, __ATOMIC_ACQ_REL);
     upload_destroy(body->upload);
+    gunzip_destroy(body->gunzip);
     free(body->text);
 }
 

@@ -3,6 +3,7 @@
 #pragma once
 #include "protocol/routes.h"
 #include "server/routes/context.h"
+#include "server/uploads/gunzip.h"
 #include "server/uploads/upload.h"
 
 #define ROUTES_BUSY_S 2 /* until another upload may find room */
@@ -11,15 +12,19 @@ struct call_body {
     char *text; /* not NUL-terminated */
     size_t text_bytes, capacity;
     struct upload *upload; /* until a handler takes it over */
+    struct gunzip *gunzip; /* NULL: it comes as it is */
     bool has_place;        /* counts as one of service->uploads */
+    bool unknown_coding;   /* it was refused for its Content-Encoding */
 };
 
 /* At the header, before the body is sent: refuses what the address does not take, and finds an
  * upload a place. Errors: PEN_UNKNOWN_TYPE, PEN_TOO_BIG, PEN_UNAVAILABLE. */
 bool body_open(struct call_body *body, struct service *service, enum pen_body takes,
     const struct http_exchange *exchange, struct pen_error *error);
-/* Errors: PEN_TOO_BIG, and those of upload_add. */
+/* Errors: PEN_TOO_BIG, PEN_MALFORMED, and those of upload_add. */
 bool body_add(struct call_body *body, const void *data, size_t bytes, struct pen_error *error);
+/* The last byte has come. Errors: PEN_MALFORMED. */
+bool body_end(struct call_body *body, struct pen_error *error);
 void body_finish(struct call_body *body, struct service *service);
 /* The text, "{}" when there is none. */
 const char *body_json(const struct call_body *body, size_t *bytes);

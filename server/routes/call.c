@@ -1,7 +1,8 @@
 #include "server/routes/call.h"
 #include "protocol/fnv.h"
 #include "protocol/memory.h"
-#include "server/http/status.h"
+#include "server/base/status.h"
+#include "server/http/tags.h"
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -47,6 +48,8 @@ static void answer_problem(struct call *call, const struct pen_error *error)
     if (error->code == PEN_UNAVAILABLE || error->code == PEN_TOO_MANY ||
         error->code == PEN_HELD_BACK)
         http_add_header(x, "Retry-After", "%u", error->retry_after_s ? error->retry_after_s : 1);
+    if (call->body.unknown_coding)
+        http_add_header(x, "Accept-Encoding", "gzip");
     if (error->code == PEN_UNAUTHORIZED)
         http_add_header(x, "WWW-Authenticate", "Bearer");
     http_add_header(x, "Cache-Control", "no-store");
@@ -78,17 +81,14 @@ bool call_json(struct call *call, uint32_t status, char *text)
 bool call_knows(const struct call *call, const char *tag)
 {
     const char *known = http_header(call->exchange, "If-None-Match");
-    char quoted[PEN_ID_HEX + 3];
-    snprintf(quoted, sizeof quoted, "\"%s\"", tag);
-    /* The list form and weak tags need no parser: our tags cannot be part of another's. */
-    return known && strstr(known, quoted);
+    return known && tags_name(known, tag);
 }
 
 bool call_not_modified(struct call *call, const char *tag)
 {
     const char *known = http_header(call->exchange, "If-None-Match");
     http_add_header(call->exchange, "ETag", "\"%s\"", tag);
-    if (!call_knows(call, tag) && !(known && !strcmp(known, "*")))
+    if (!call_knows(call, tag) && !(known && tags_are_any(known)))
         return false;
     http_answer(call->exchange, 304, NULL, http_static(NULL, 0));
     return true;

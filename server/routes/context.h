@@ -4,7 +4,7 @@
 #include "server/auto/render.h"
 #include "server/base/config.h"
 #include "server/base/metrics.h"
-#include "server/http/auth.h"
+#include "server/access/auth.h"
 #include "server/http/http.h"
 #include "server/jobs/jobs.h"
 #include "server/queue/scheduler.h"
@@ -31,7 +31,6 @@ struct service {
     struct auth *auth; /* NULL: no token is asked for */
     struct http_listener *listener, *admin;
     char *openapi, openapi_tag[PEN_ID_HEX + 1];
-    char *cert_pem, *key_pem;
     uint64_t started_ns;
     int canary_blob; /* a plane, as a blob in a memfd */
     uint8_t canary_id[PEN_ID_BYTES];

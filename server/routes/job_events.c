@@ -162,8 +162,6 @@ static int64_t read_events(void *owner, void *to, size_t most)
         put_news(e);
         if (!e->bytes && !e->over && sleep_if_idle(e))
             return 0;
-        if (e->bytes)
-            http_expect(e->exchange, e->bytes);
     }
 }
 

@@ -3,7 +3,7 @@
 #include "protocol/memory.h"
 #include "server/base/clock.h"
 #include "server/base/log.h"
-#include "server/http/guard.h"
+#include "server/access/guard.h"
 #include "server/routes/routes.h"
 #include <stdio.h>
 #include <stdlib.h>
@@ -185,7 +185,7 @@ static void add_common(struct call *call)
     }
 }
 
-static void begin(struct http_exchange *x, const struct pen_error *framing)
+static void begin(struct http_exchange *x, const struct pen_error *fault)
 {
     struct call *call = pen_alloc_zero(1, sizeof *call);
     x->user = call;
@@ -195,7 +195,7 @@ static void begin(struct http_exchange *x, const struct pen_error *framing)
     call->next = life;
     http_trace_read(&call->trace, http_header(x, "traceparent"));
     add_common(call);
-    call_resume(call, framing);
+    call_resume(call, fault);
 }
 
 static void body(struct http_exchange *x, const void *data, size_t bytes)
@@ -209,7 +209,10 @@ static void body(struct http_exchange *x, const void *data, size_t bytes)
 
 static void end(struct http_exchange *x)
 {
-    call_resume(x->user, NULL);
+    struct call *call = x->user;
+    struct pen_error error = {0};
+    body_end(&call->body, &error);
+    call_resume(call, &error);
 }
 
 static void completed(struct http_exchange *x)

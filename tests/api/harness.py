@@ -52,7 +52,8 @@ class Daemon:
         if start:
             self.start()
 
-    def start(self):
+    def start(self, descriptors=None):
+        """`descriptors`: how many the daemon and its children may have each."""
         if self.process:
             self.process.stdout.close()
         self.log_path = os.path.join(self.folder, "log-%f" % time.time())
@@ -63,7 +64,8 @@ class Daemon:
             name = flag.split("=")[0]
             flags.pop(name, None)
             extra.append(flag)
-        command = [os.path.join(BIN, "penumbrad")] + ["%s=%s" % f for f in flags.items()] + extra
+        limit = ["prlimit", "--nofile=%d" % descriptors] if descriptors else []
+        command = limit + [os.path.join(BIN, "penumbrad")] + ["%s=%s" % f for f in flags.items()] + extra
         with open(self.log_path, "wb") as log:
             self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log,
                                             env={**os.environ, **self.env})
@@ -124,6 +126,12 @@ class Daemon:
         match = re.search(r"^%s%s (\S+)$" % (re.escape(name), re.escape(labels)),
                           self.admin("/metrics").body.decode(), re.M)
         return float(match[1]) if match else None
+
+    def processor_s(self):
+        """Processor time of the daemon itself."""
+        with open("/proc/%d/stat" % self.process.pid) as f:
+            after = f.read().rsplit(")", 1)[1].split()
+        return (int(after[11]) + int(after[12])) / os.sysconf("SC_CLK_TCK")
 
     def children(self, name):
         pids = []

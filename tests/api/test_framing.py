@@ -28,62 +28,17 @@ class Framing(unittest.TestCase):
     def tearDown(self):
         self.assertEqual(self.d.get("/v1").status, 200)
 
-    def one_refusal(self, request, status=400, by_library=False):
+    def one_refusal(self, request, status=400):
         """Exactly one answer, then the connection ends: nothing behind it was run."""
         got, closed = raw(self.d.port, request, timeout=3)
         self.assertTrue(got.startswith(b"HTTP/1.1 %d " % status), got[:200])
-        # libmicrohttpd 0.9.75 sends the header of its own refusals twice, 1.0 does not.
-        answers = len(re.findall(rb"HTTP/1\.1 \d\d\d ", got))
-        self.assertIn(answers, (1, 2) if by_library else (1,), got)
-        self.assertEqual(got.count(b"HTTP/1.1 %d " % status), answers, got)
+        self.assertEqual(len(re.findall(rb"HTTP/1\.1 \d\d\d ", got)), 1, got)
         self.assertNotIn(b'"techniques"', got)
         self.assertTrue(closed)
         if b"problem+json" in got and not request.startswith(b"HEAD"):
             document = json.loads(got.split(b"\r\n\r\n", 1)[1])
             self.assertEqual(document["status"], status)
         return got
-
-    def test_ambiguous_lengths(self):
-        post = b"POST /v1/scenes/%s/render HTTP/1.1\r\n" % self.id.encode() + HOST
-        chunk = b"2\r\n{}\r\n0\r\n\r\n"
-        for headers, body in (
-                (b"Content-Length: 2\r\nContent-Length: 40\r\n", b"{}" + SMUGGLED),
-                (b"Content-Length: 2\r\nContent-Length: 2\r\n", b"{}" + SMUGGLED),
-                (b"Content-Length : 2\r\n", b"{}" + SMUGGLED),
-                (b"Content-Length: 2, 2\r\n", b"{}" + SMUGGLED),
-                (b"Content-Length: +2\r\n", b"{}" + SMUGGLED),
-                (b"Content-Length: 0x2\r\n", b"{}" + SMUGGLED),
-                (b"Content-Length: -2\r\n", b"{}" + SMUGGLED),
-                (b"Content-Length: 2\r\nTransfer-Encoding: chunked\r\n", chunk + SMUGGLED),
-                (b"Transfer-Encoding: chunked\r\nContent-Length: 12\r\n", chunk + SMUGGLED),
-                (b"Transfer-Encoding: xchunked\r\n", chunk + SMUGGLED),
-                (b"Transfer-Encoding: chunked, identity\r\n", chunk + SMUGGLED),
-                (b"Transfer-Encoding: gzip, chunked\r\n", chunk + SMUGGLED),
-                (b"Transfer-Encoding: chunked\r\nTransfer-Encoding: chunked\r\n", chunk + SMUGGLED),
-                (b"Transfer-Encoding : chunked\r\n", chunk + SMUGGLED),
-                (b"Bad(Header): 1\r\nContent-Length: 2\r\n", b"{}" + SMUGGLED)):
-            with self.subTest(headers=headers):
-                not_a_number = headers.startswith(b"Content-Length: ") and headers.split()[1] != b"2"
-                self.one_refusal(post + headers + b"\r\n" + body, by_library=not_a_number)
-
-    def test_folded_lines(self):
-        post = b"POST /v1/scenes/%s/render HTTP/1.1\r\n" % self.id.encode() + HOST
-        for headers in (
-                b"Content-Length:\r\n 2\r\n",
-                b"Content-Length: \r\n\t2\r\n",
-                b"Content-Length: 2\r\n \r\n",
-                b"Content-Length: 1\r\n 2\r\n",
-                b"Transfer-Encoding:\r\n chunked\r\n",
-                b"X: a\r\n b\r\nContent-Length: 2\r\n",
-                b"X: a\r\n Content-Length: 2\r\n",
-                b"X:\r\n a\r\nContent-Length: 2\r\n"):
-            with self.subTest(headers=headers):
-                self.one_refusal(post + headers + b"\r\n{}" + SMUGGLED, by_library=True)
-        # What must not be taken for one: nothing, blanks before and behind.
-        for header in (b"X:\r\n", b"X: \r\n", b"X:a\r\n", b"X: \t a \t\r\n", b"X: a: b\r\n"):
-            got, _ = raw(self.d.port, b"GET /v1/techniques/none HTTP/1.1\r\n" + HOST + header +
-                         b"Connection: close\r\n\r\n", timeout=3)
-            self.assertIn(b" 200 ", got[:20], header)
 
     def test_body_where_none_belongs(self):
         for method in (b"GET", b"HEAD", b"DELETE"):
@@ -230,35 +185,6 @@ class Framing(unittest.TestCase):
         for blocker in blockers:
             blocker.join()
         harness.wait(lambda: self.d.metric("penumbra_renders_abandoned_total") == gone + 1)
-
-    def test_connection_limits(self):
-        d = Daemon("--connections=8", "--connections-per-address=6")
-        try:
-            held = [socket.create_connection(("127.0.0.1", d.port)) for _ in range(6)]
-            harness.wait(lambda: d.metric("penumbra_connections") == 6)
-            got, closed = raw(d.port, b"GET /v1 HTTP/1.1\r\n" + HOST + b"\r\n", timeout=3)
-            self.assertIn(b" 429 ", got[:20])
-            self.assertIn(b"Retry-After: ", got)
-            self.assertTrue(closed)
-            self.assertEqual(d.admin("/livez").status, 200)
-            for s in held:
-                s.close()
-            harness.wait(lambda: d.metric("penumbra_connections") == 0)
-            self.assertEqual(d.get("/v1").status, 200)
-        finally:
-            self.assertEqual(d.stop(), 0)
-            d.kill()
-        d = Daemon("--connections=4")
-        try:
-            held = [socket.create_connection(("127.0.0.1", d.port)) for _ in range(4)]
-            harness.wait(lambda: d.metric("penumbra_connections") == 4)
-            got, _ = raw(d.port, b"GET /v1 HTTP/1.1\r\n" + HOST + b"\r\n", timeout=3)
-            self.assertIn(b" 503 ", got[:20])
-            for s in held:
-                s.close()
-        finally:
-            self.assertEqual(d.stop(), 0)
-            d.kill()
 
 
 if __name__ == "__main__":

@@ -1,9 +1,9 @@
 /* Settings from flags and variables, the Accept header, tokens, and the quarantine. */
 #include "protocol/request.h"
 #include "server/http/accept.h"
-#include "server/http/auth.h"
-#include "server/http/guard.h"
-#include "server/http/status.h"
+#include "server/access/auth.h"
+#include "server/access/guard.h"
+#include "server/base/status.h"
 #include "server/base/config.h"
 #include "server/workers/quarantine.h"
 #include "tests/unit/check.h"

@@ -1,6 +1,6 @@
 #include "server/jobs/store/job_json.h"
 #include "protocol/request.h"
-#include "server/http/status.h"
+#include "server/base/status.h"
 #include <stdio.h>
 #include <stdlib.h>
 

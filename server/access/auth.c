@@ -1,4 +1,4 @@
-#include "server/http/auth.h"
+#include "server/access/auth.h"
 #include "protocol/memory.h"
 #include "server/base/hash.h"
 #include <errno.h>

@@ -1,4 +1,4 @@
-#include "server/http/status.h"
+#include "server/base/status.h"
 #include "protocol/json_result.h"
 
 /* The caller's mistake is 4xx, the machine's 5xx. The compiler misses no row. */
@@ -29,6 +29,7 @@ struct http_status http_status_of(enum pen_code code)
         ROW(NOT_ACCEPTABLE, 406, "Not Acceptable", false);
         ROW(RANGE, 416, "Range Not Satisfiable", false);
         ROW(URI_TOO_LONG, 414, "URI Too Long", false);
+        ROW(HEADER_TOO_BIG, 431, "Request Header Fields Too Large", false);
 #undef ROW
     case PEN_CODES:
         break;

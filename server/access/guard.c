@@ -1,4 +1,4 @@
-#include "server/http/guard.h"
+#include "server/access/guard.h"
 #include <arpa/inet.h>
 #include <ctype.h>
 #include <stdlib.h>

@@ -45,7 +45,8 @@ static const struct row rows[] = {
     ROW(store, "penumbra-store", .form = "FOLDER",
         .help = "Folder of the stored scenes and images."),
     ROW(store_limit, "0", SIZE,
-        .help = "What the store may hold; beyond it uploads are 507. 0: as much as the disk does."),
+        .help = "What the store may hold; beyond it uploads are 507. 0: as much as the disk does. "
+                "Results of jobs have a limit of their own."),
     ROW(device, "auto", .choices = pen_device_choice_names, .help = "Kind of device to render on."),
     ROW(device_index, "0", .max = 63,
         .help = "First GPU to use; further workers take the following ones."),

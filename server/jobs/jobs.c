@@ -87,6 +87,15 @@ struct job_store *jobs_store(struct jobs *j, struct pen_error *error)
     return store;
 }
 
+bool jobs_read(struct jobs *j, struct job_numbers *numbers)
+{
+    pthread_mutex_lock(&j->lock);
+    *numbers = j->numbers;
+    bool there = j->store != NULL;
+    pthread_mutex_unlock(&j->lock);
+    return there;
+}
+
 /* ---- jobs under way ---- */
 
 /* Seconds until the first of those under way is likely to be over. With the lock held. */
@@ -97,7 +106,8 @@ static uint32_t retry_s(const struct jobs *j)
     for (const struct running *r = j->first; r; r = r->next)
         count++;
     for (const struct running *r = j->first; r; r = r->next)
-        least = fmin(least, (r->job.frames - r->there) * j->frame_ms * count / 1e3);
+        least = fmin(least, (r->job.frames - __atomic_load_n(&r->there, __ATOMIC_RELAXED)) *
+                                j->frame_ms * count / 1e3);
     return (uint32_t)fmax(1, ceil(least));
 }
 

@@ -17,6 +17,9 @@ void jobs_destroy(struct jobs *jobs); /* NULL is fine */
 /* NULL, and PEN_UNAVAILABLE that says why, where the database cannot be used. */
 struct job_store *jobs_store(struct jobs *jobs, struct pen_error *error);
 
+/* As of some seconds ago: it waits for nothing. False: the database cannot be used. */
+bool jobs_read(struct jobs *jobs, struct job_numbers *numbers);
+
 /* What a client asks for; `body` as job_plan_create takes it, needed for the call. */
 struct job_order {
     enum job_kind kind;

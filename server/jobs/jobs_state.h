@@ -14,10 +14,10 @@ struct running {
     bool cancelled;        /* atomic */
     /* The runner's, or the finisher's while it has it: */
     struct job job;
-    uint8_t *frames;   /* enum frame_state */
-    uint8_t *attempts; /* of each frame, that failed */
-    uint32_t first;    /* no frame before it is to be done */
-    uint32_t in_flight, there;
+    uint8_t *frames;           /* enum frame_state */
+    uint8_t *attempts;         /* of each frame, that failed */
+    uint32_t first;            /* no frame before it is to be done */
+    uint32_t in_flight, there; /* there: atomic, for those who ask when it will be over */
     uint64_t begun_ns;
     uint64_t served;       /* number of the frame that was begun last */
     uint64_t due_ns;       /* nothing is begun before */
@@ -50,6 +50,7 @@ struct jobs {
     struct flight *ended;
     struct running *to_finish;
     pthread_cond_t to_finish_news;
+    struct job_numbers numbers;
     bool draining, woken;
     double frame_ms; /* from one frame to the next, decaying; 0: not known */
     uint64_t last_frame_ns;

@@ -22,7 +22,7 @@ static bool read_recorded(struct job_store *store, struct running *r, struct pen
     uint32_t seq = 0, count = 0;
     bool ok;
     do {
-        ok = job_store_frames(store, r->job.id, seq, frames, PIECE, &count, error);
+        ok = job_store_frames(store, r->job.id, seq, frames, PIECE, &count, NULL, error);
         for (uint32_t i = 0; ok && i < count; i++) {
             mark_done(r, frames[i].number);
             seq = frames[i].seq;

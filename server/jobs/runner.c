@@ -112,10 +112,13 @@ static bool record_end(struct jobs *j, struct running *r, enum job_state state)
     job.state = state;
     job.ended_s = jobs_now_s();
     job.expires_s = jobs_expiry_s(j);
-    if (state == JOB_FAILED)
-        log_event(LOG_ERROR, "a job failed: %s", job.error.message);
     if (!job_store_set_state(j->store, &job, &error) && error.code != PEN_OK)
         return false;
+    if (state == JOB_FAILED) {
+        char id[PEN_ID_HEX + 1];
+        pen_id_to_hex(job.id, id);
+        log_event(LOG_ERROR, "job %s failed: %s", id, job.error.message);
+    }
     j->bytes += job.result.bytes;
     jobs_tell(j, job.id, JOB_CHANGED);
     return true;
@@ -211,7 +214,7 @@ static bool keep_frame(struct jobs *j, struct running *r, uint32_t number,
         return false;
     r->is_settled = true;
     r->frames[number] = FRAME_DONE;
-    r->there++;
+    __atomic_add_fetch(&r->there, 1, __ATOMIC_RELAXED);
     r->job.bytes += frame.file.bytes;
     j->bytes += frame.file.bytes;
     return true;
@@ -239,7 +242,7 @@ static bool keep_comparison(
         close(folder);
     free(text);
     if (ok) /* what a method could not render has no image */
-        r->there = r->job.frames;
+        __atomic_store_n(&r->there, r->job.frames, __ATOMIC_RELAXED);
     return ok;
 }
 
@@ -316,6 +319,7 @@ static bool compare_out(struct jobs *j, struct flight *flight, struct pen_error 
         .count = 1 + asked->count,
         .payer = flight->job->job.client,
         .patience_ms = 3600000,
+        .background = true,
         .is_gone = is_compare_gone,
         .done = compare_done,
         .owner = flight};
@@ -348,6 +352,7 @@ static bool frame_out(struct jobs *j, struct flight *flight, struct pen_error *e
     picture_key(&request, key);
     flight->waiter = (struct waiter){.payer = r->job.client,
         .deadline_ns = clock_now_ns() + PATIENCE_NS,
+        .background = true,
         .is_gone = is_gone,
         .finish = finish};
     return scheduler_submit(j->config.scheduler, &request, key,
@@ -447,8 +452,12 @@ static void expire(struct jobs *j)
         job_files_remove(j->root, id);
         jobs_tell(j, id, JOB_CHANGED);
     }
-    if (job_store_read(j->store, &numbers, NULL)) /* clients delete some, too */
-        j->bytes = numbers.bytes;
+    if (!job_store_read(j->store, &numbers, NULL))
+        return;
+    j->bytes = numbers.bytes; /* clients delete some, too */
+    pthread_mutex_lock(&j->lock);
+    j->numbers = numbers;
+    pthread_mutex_unlock(&j->lock);
 }
 
 void jobs_open_store(struct jobs *j)

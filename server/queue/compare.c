@@ -33,6 +33,7 @@ static bool submit(struct compare *c, struct pen_error *error)
     c->waiter.measure = c->plan.measures ? c->plan.measures[c->at]
                         : c->at          ? MEASURE_COMPARED
                                          : MEASURE_REFERENCE;
+    c->waiter.background = c->plan.background;
     c->waiter.continues = c->at > 0;
     c->waiter.following = request + 1;
     c->waiter.following_count = c->plan.deadline_ns ? c->plan.count - c->at - 1 : 0;

@@ -14,6 +14,7 @@ struct compare_plan {
     uint64_t payer;                     /* whose time it takes; 0: the client's */
     uint64_t deadline_ns;               /* of all together; 0: patience_ms for each */
     uint32_t patience_ms;
+    bool background; /* see struct waiter */
     /* Called before every request but the first; false leaves it out. May be NULL. */
     bool (*wants)(void *owner, struct compare *compare, uint32_t request);
     bool (*is_gone)(void *owner); /* the client has hung up; may be NULL */

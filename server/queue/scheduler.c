@@ -63,6 +63,7 @@ static void push_back(struct scheduler *s, struct render *render)
         s->queue[0] = render;
     s->queue[1] = render;
     s->numbers.queued++;
+    s->numbers.background += render->background;
 }
 
 static void push_front(struct scheduler *s, struct render *render)
@@ -72,6 +73,13 @@ static void push_front(struct scheduler *s, struct render *render)
     if (!s->queue[1])
         s->queue[1] = render;
     s->numbers.queued++;
+    s->numbers.background += render->background;
+}
+
+/* True when those who wait for an answer have taken all places. */
+static bool is_full(const struct scheduler *s)
+{
+    return s->numbers.queued - s->numbers.background >= s->limits.queue;
 }
 
 static void unlink_queued(struct scheduler *s, struct render *render)
@@ -86,6 +94,7 @@ static void unlink_queued(struct scheduler *s, struct render *render)
     if (s->queue[1] == render)
         s->queue[1] = before;
     s->numbers.queued--;
+    s->numbers.background -= render->background;
 }
 
 static void unlink_running(struct scheduler *s, struct render *render)
@@ -144,6 +153,7 @@ static void set_up(struct render *render, const struct pen_request *request,
         render->estimate.ms = fmin(estimate.ms, request->delivery.budget_ms);
     render->place = picture_place(request);
     render->continues = waiter->continues;
+    render->background = waiter->background;
 }
 
 static void enter(struct scheduler *s, struct render *render, uint64_t payer)
@@ -171,7 +181,7 @@ bool scheduler_submit(struct scheduler *s, const struct pen_request *request,
     } else if (s->limits.client_share && held >= s->limits.client_share) {
         s->numbers.refused_share++;
         pen_fail(error, PEN_TOO_MANY, "", "This client already has %u renders under way.", held);
-    } else if (!render && !fresh->continues && s->numbers.queued >= s->limits.queue) {
+    } else if (!render && !fresh->continues && !fresh->background && is_full(s)) {
         s->numbers.refused_full++;
         pen_fail(error, PEN_UNAVAILABLE, "", "The queue is full.");
     } else if (!render && !fresh->continues && scheduler_is_late(s, fresh, payer, waiter, error)) {
@@ -531,7 +541,7 @@ void scheduler_read(struct scheduler *s, struct scheduler_numbers *numbers)
 {
     pthread_mutex_lock(&s->lock);
     *numbers = s->numbers;
-    numbers->full = s->numbers.queued >= s->limits.queue;
+    numbers->full = is_full(s);
     numbers->backlog_ms = scheduler_backlog_ms(s, 0);
     numbers->estimates = estimates_count(s->estimates);
     pthread_mutex_unlock(&s->lock);

@@ -43,6 +43,9 @@ struct waiter {
     const struct pen_request *following;
     uint32_t following_count;
     bool continues;
+    /* Its owner bounds how many of these there are: they take nobody's place in the queue, and are not
+     * refused for a full one. */
+    bool background;
 };
 
 struct render {
@@ -54,7 +57,7 @@ struct render {
     uint64_t queued_ns, taken_ns;
     uint64_t last_deadline_ns;
     uint64_t best_until_ns; /* of a waiter who takes what there is; 0: there is none */
-    bool shareable, running, batch, fresh, continues;
+    bool shareable, running, batch, fresh, continues, background;
     uint32_t measure;
     int reference_fd;                  /* the render's own; 0: none */
     uint32_t attempts, kills, starved; /* kept by the worker pool */
@@ -131,6 +134,7 @@ void scheduler_cancel(struct scheduler *scheduler);
 
 struct scheduler_numbers {
     uint32_t queued, running, waiting; /* renders, renders, clients */
+    uint32_t background;               /* of those queued */
     uint64_t refused_full, refused_share, refused_late, expired, abandoned, shared;
     double backlog_ms; /* what is queued and running will take, as far as that is known */
     uint32_t estimates;

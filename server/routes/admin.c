@@ -106,6 +106,8 @@ static void write_service(struct service *s, struct metrics_text *text)
     struct importer_numbers imports;
     struct result_cache_numbers cache;
     struct door_numbers door;
+    struct job_numbers jobs;
+    bool has_jobs = jobs_read(s->jobs, &jobs);
     worker_pool_read(s->pool, &pool);
     scheduler_read(s->scheduler, &queue);
     importer_read(s->importer, &imports);
@@ -207,6 +209,12 @@ static void write_service(struct service *s, struct metrics_text *text)
             (double)scene_store_faults(s->store)},
         {"penumbra_store_rounds_total", "counter", "Times that all that is stored was checked.",
             (double)scrubber_rounds(s->scrubber)},
+        {"penumbra_jobs_under_way", "gauge", "Jobs that are not over.",
+            jobs.jobs[JOB_ACCEPTED] + jobs.jobs[JOB_RUNNING]},
+        {"penumbra_jobs_over", "gauge", "Jobs that are over and kept.",
+            jobs.jobs[JOB_SUCCESSFUL] + jobs.jobs[JOB_FAILED] + jobs.jobs[JOB_DISMISSED]},
+        {"penumbra_job_bytes", "gauge", "Results of jobs.", (double)jobs.bytes},
+        {"penumbra_jobs_available", "gauge", "0: their database cannot be used.", has_jobs},
         {"penumbra_connections", "gauge", "Open public connections.", door.open},
         {"penumbra_connections_accepted_total", "counter", "Public connections.",
             (double)door.accepted},

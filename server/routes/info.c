@@ -1,5 +1,6 @@
 /* What the service tells about itself: pages, contract, methods, numbers. */
 #include "protocol/json_result.h"
+#include "protocol/json_sequence.h"
 #include "server/base/clock.h"
 #include "server/pages/pages.h"
 #include "server/routes/routes.h"
@@ -73,6 +74,10 @@ static void write_limits(struct pen_json *json, const struct config *config)
     pen_json_uint(json, "store_bytes", config->store_limit.bytes);
     pen_json_uint(json, "queued_renders", config->queue_limit);
     pen_json_uint(json, "renders_per_client", config->client_share);
+    pen_json_uint(json, "jobs", config->jobs);
+    pen_json_uint(json, "jobs_per_client", config->jobs_share);
+    pen_json_uint(json, "job_bytes", config->jobs_limit.bytes);
+    pen_json_uint(json, "sequence_frames", PEN_SEQUENCE_FRAMES);
     pen_json_uint(json, "gpu_memory_bytes", config->gpu_memory.bytes);
     pen_json_end(json);
 }
@@ -118,6 +123,7 @@ bool route_service(struct call *call, struct pen_error *error)
     pen_json_string(&json, "techniques", "/v1/techniques");
     pen_json_string(&json, "scenes", "/v1/scenes");
     pen_json_string(&json, "images", "/v1/images");
+    pen_json_string(&json, "jobs", "/v1/jobs");
     pen_json_string(&json, "stats", "/v1/stats");
     pen_json_end(&json);
     pen_json_end(&json);

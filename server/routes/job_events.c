@@ -96,11 +96,11 @@ static void put_news(struct events *e)
 {
     struct job job;
     struct job_frame frames[PIECE_FRAMES];
-    uint32_t count = 0;
+    uint32_t count = 0, before = 0;
     struct pen_error error = {0};
     struct job_store *store = jobs_store(e->jobs, &error);
     if (!store || !job_store_get(store, e->id, &job, &error) ||
-        !job_store_frames(store, e->id, e->seq, frames, PIECE_FRAMES, &count, &error)) {
+        !job_store_frames(store, e->id, e->seq, frames, PIECE_FRAMES, &count, &before, &error)) {
         e->over = true; /* removed, or unknown: the client asks again and is told */
         return;
     }
@@ -110,8 +110,7 @@ static void put_news(struct events *e)
             append_state(e, &job);
             state_is_new = false;
         }
-        append_frame(
-            e, &job, &frames[i], frames[i].seq > job.seq ? job.done : job.done - (count - 1 - i));
+        append_frame(e, &job, &frames[i], before + i + 1);
     }
     if (count == PIECE_FRAMES)
         return;

@@ -73,7 +73,8 @@ static enum step_end find(struct call *call, struct pen_error *error)
     if (!strcmp(x->method, "OPTIONS") && *call->service->config->cors_origin) {
         http_add_header(x, "Access-Control-Allow-Methods", "%s", allow);
         http_add_header(x, "Access-Control-Allow-Headers",
-            "Authorization, Content-Type, If-None-Match, Prefer, traceparent");
+            "Authorization, Content-Type, Idempotency-Key, If-None-Match, If-Range, Last-Event-ID, "
+            "Prefer, Range, traceparent");
         http_add_header(x, "Access-Control-Max-Age", "600");
         http_answer(x, 204, NULL, http_static(NULL, 0));
         return STEP_OVER;
@@ -181,7 +182,8 @@ static void add_common(struct call *call)
         http_add_header(x, "Access-Control-Allow-Origin", "%s", origin);
         http_add_header(x, "Access-Control-Expose-Headers",
             "ETag, Server-Timing, Location, Retry-After, X-Request-Id, Content-Location, "
-            "X-Penumbra-Choice, X-Penumbra-History, X-Penumbra-Warning");
+            "X-Penumbra-Choice, X-Penumbra-History, X-Penumbra-Warning, Accept-Ranges, "
+            "Content-Range, Preference-Applied");
     }
 }
 

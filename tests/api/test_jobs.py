@@ -250,7 +250,8 @@ class Jobs(unittest.TestCase):
     # ---- events ----
 
     def test_events(self):
-        id = start(self.d, self.scene, {"frames": 20, "turntable": {}})["id"]
+        frame_count = 80  # more than are sent at once
+        id = start(self.d, self.scene, {"frames": frame_count, "turntable": {}})["id"]
         seen, last = [], None
         while True:  # from connection to connection
             events = Events(self.d, id, last)
@@ -261,16 +262,21 @@ class Jobs(unittest.TestCase):
             for number, event in enumerate(events):
                 seen.append(event)
                 last = event[0]
-                if number == 5:
+                if number == 20:
                     break
             events.close()
         ids = [e[0] for e in seen]
         self.assertEqual(ids, sorted(set(ids)))
         frames = [e[2]["frame"] for e in seen if e[1] == "frame"]
-        self.assertEqual(sorted(frames), list(range(20)))
-        self.assertEqual([e[2]["done"] for e in seen if e[1] == "frame"], list(range(1, 21)))
+        self.assertEqual(sorted(frames), list(range(frame_count)))
+        self.assertEqual([e[2]["done"] for e in seen if e[1] == "frame"],
+                         list(range(1, frame_count + 1)))
         self.assertEqual((seen[-1][1], seen[-1][2]["state"]), ("state", "successful"))
-        for event in seen:
+        late = list(Events(self.d, id))  # from the beginning, when all is over
+        self.assertEqual([e[2]["done"] for e in late if e[1] == "frame"],
+                         list(range(1, frame_count + 1)))
+        self.assertEqual(late[-1], seen[-1])
+        for event in seen[:30]:
             if event[1] == "frame":
                 self.assertEqual(len(self.d.get(event[2]["href"]).body), event[2]["bytes"])
 
@@ -297,6 +303,8 @@ class Jobs(unittest.TestCase):
         for _ in range(5):
             self.assertEqual(self.d.render(self.scene, SMALL).status, 200)
         self.assertEqual(job(self.d, id)["state"], "running")
+        wait(lambda: self.d.metric("penumbra_jobs_under_way"))
+        self.assertEqual(self.d.metric("penumbra_jobs_available"), 1)
         self.d.call("DELETE", "/v1/jobs/" + id)
 
     # ---- keys ----

@@ -94,18 +94,19 @@ static void frames_and_their_events(void)
     struct job_store *s = fresh();
     struct job_frame frames[8];
     struct job job;
-    uint32_t count;
+    uint32_t count, before;
     add(s, 1, 7);
     go_on(s, 1, JOB_RUNNING, 0);
     CHECK(add_frame(s, 1, 3, 100) && add_frame(s, 1, 0, 50));
     CHECK(add_frame(s, 1, 3, 999)); /* known already: nothing changes */
     job = get(s, 1);
     CHECK(job.done == 2 && job.bytes == 150 && job.seq == 4 && job.state_seq == 2);
-    CHECK(job_store_frames(s, job.id, 0, frames, 8, &count, NULL) && count == 2);
+    CHECK(job_store_frames(s, job.id, 0, frames, 8, &count, &before, NULL) && count == 2);
     CHECK(frames[0].number == 3 && frames[0].seq == 3 && frames[1].number == 0);
-    CHECK(job_store_frames(s, job.id, 3, frames, 8, &count, NULL) && count == 1);
-    CHECK(job_store_frames(s, job.id, 4, frames, 8, &count, NULL) && count == 0);
-    CHECK(job_store_frames(s, job.id, 0, frames, 1, &count, NULL) && count == 1);
+    CHECK(job_store_frames(s, job.id, 3, frames, 8, &count, &before, NULL) && count == 1);
+    CHECK(before == 1);
+    CHECK(job_store_frames(s, job.id, 4, frames, 8, &count, &before, NULL) && count == 0);
+    CHECK(job_store_frames(s, job.id, 0, frames, 1, &count, NULL, NULL) && count == 1);
     CHECK(job_store_frame(s, job.id, 0, frames, NULL) && frames[0].file.bytes == 50);
     struct pen_error error = {0};
     CHECK(!job_store_frame(s, job.id, 2, frames, &error) && error.code == PEN_NOT_FOUND);

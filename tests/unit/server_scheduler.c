@@ -404,8 +404,40 @@ static void test_measured_is_fresh(void)
     scheduler_destroy(s);
 }
 
+/* Of those whose owner bounds them any number waits, and they leave the others' places alone. */
+static void background_takes_no_place(void)
+{
+    struct scheduler *s = make(1, 0);
+    struct client clients[5];
+    struct pen_error error = {0};
+    struct scheduler_numbers numbers;
+    for (uint8_t i = 0; i < 3; i++) {
+        struct pen_request request = {.width = i + 1};
+        uint8_t id[PEN_ID_BYTES] = {i + 1};
+        memset(&clients[i], 0, sizeof clients[i]);
+        clients[i].waiter = (struct waiter){.payer = 1,
+            .deadline_ns = clock_now_ns() + 60 * CLOCK_S,
+            .background = true,
+            .finish = finish};
+        request.delivery.priority = PEN_PRIORITY_BATCH;
+        CHECK(scheduler_submit(s, &request, id, true, &clients[i].waiter, &error));
+    }
+    scheduler_read(s, &numbers);
+    CHECK(numbers.queued == 3 && numbers.background == 3 && !numbers.full);
+    CHECK(submit(s, &clients[3], 9, false, true, 2, 60000, &error));
+    CHECK(!submit(s, &clients[4], 10, false, true, 2, 60000, &error));
+    CHECK(error.code == PEN_UNAVAILABLE);
+    CHECK(take_and_finish(s, 0) == 9);
+    for (int i = 0; i < 3; i++)
+        CHECK(take_and_finish(s, 0));
+    scheduler_read(s, &numbers);
+    CHECK(numbers.queued == 0 && numbers.background == 0);
+    scheduler_destroy(s);
+}
+
 int main(void)
 {
+    background_takes_no_place();
     test_measured_is_fresh();
     test_parts();
     test_order();

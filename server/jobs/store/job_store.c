@@ -107,14 +107,14 @@ static void read_number(void *context, const struct database_value *columns)
 
 /* ---- rows ---- */
 
-struct jobs_read {
+struct job_rows {
     struct job *jobs;
     uint32_t most, count;
 };
 
 static void read_job(void *context, const struct database_value *c)
 {
-    struct jobs_read *into = context;
+    struct job_rows *into = context;
     if (into->count == into->most)
         return;
     struct job *job = &into->jobs[into->count];
@@ -266,7 +266,7 @@ bool job_store_get(
 {
     struct hex hex = hex_of(id);
     struct database_value values[] = {TEXT(hex.text)};
-    struct jobs_read read = {job, 1, 0};
+    struct job_rows read = {job, 1, 0};
     return run(s, "SELECT " JOB_COLUMNS " FROM jobs WHERE id = $1", values, 1, read_job, &read,
                error) &&
            (read.count ||
@@ -294,7 +294,7 @@ bool job_store_list(struct job_store *s, struct job_page *page, struct pen_error
         before = hex_of(page->before);
     struct database_value values[] = {
         NUMBER(page->client), NUMBER(page->state), TEXT(before.text), NUMBER(page->most)};
-    struct jobs_read read = {page->jobs, page->most, 0};
+    struct job_rows read = {page->jobs, page->most, 0};
     int64_t total = 0;
     bool ok = run(s,
                   "SELECT " JOB_COLUMNS " FROM jobs WHERE ($1 = 0 OR client = $1) AND ($2 = 5 OR "
@@ -347,16 +347,22 @@ bool job_store_exists(
 }
 
 bool job_store_frames(struct job_store *s, const uint8_t id[PEN_ID_BYTES], uint32_t seq,
-    struct job_frame *frames, uint32_t most, uint32_t *count, struct pen_error *error)
+    struct job_frame *frames, uint32_t most, uint32_t *count, uint32_t *before,
+    struct pen_error *error)
 {
     struct hex hex = hex_of(id);
     struct database_value values[] = {TEXT(hex.text), NUMBER(seq), NUMBER(most)};
     struct frames_read read = {frames, most, 0};
+    int64_t number = 0;
     bool ok = run(s,
-        "SELECT number, seq, bytes, tag, name FROM frames WHERE job = $1 AND seq > $2 "
-        "ORDER BY seq LIMIT $3",
-        values, 3, read_frame, &read, error);
+                  "SELECT number, seq, bytes, tag, name FROM frames WHERE job = $1 AND seq > $2 "
+                  "ORDER BY seq LIMIT $3",
+                  values, 3, read_frame, &read, error) &&
+              (!before || run(s, "SELECT COUNT(*) FROM frames WHERE job = $1 AND seq <= $2", values,
+                              2, read_number, &number, error));
     *count = read.count;
+    if (before)
+        *before = (uint32_t)number;
     return ok;
 }
 

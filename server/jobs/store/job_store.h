@@ -97,9 +97,11 @@ bool job_store_active(struct job_store *store, uint8_t (**ids)[PEN_ID_BYTES], ui
 bool job_store_exists(
     struct job_store *store, const uint8_t id[PEN_ID_BYTES], bool *exists, struct pen_error *error);
 
-/* Frames whose events came after `seq`, in that order, at most `most`. */
+/* Frames whose events came after `seq`, in that order, at most `most`; *before: how many came before
+ * (may be NULL). */
 bool job_store_frames(struct job_store *store, const uint8_t id[PEN_ID_BYTES], uint32_t seq,
-    struct job_frame *frames, uint32_t most, uint32_t *count, struct pen_error *error);
+    struct job_frame *frames, uint32_t most, uint32_t *count, uint32_t *before,
+    struct pen_error *error);
 /* Errors also: PEN_NOT_FOUND. */
 bool job_store_frame(struct job_store *store, const uint8_t id[PEN_ID_BYTES], uint32_t number,
     struct job_frame *frame, struct pen_error *error);

@@ -247,6 +247,7 @@ void frame_output_aim(const struct frame_job *job, const struct view *v, uint32_
     if (r->background[0] != PEN_AUTO && !pen_request_is_transparent(r))
         memcpy(b.background, r->background, 12);
     memcpy(b.ground_albedo, r->ground_albedo, 12);
+    b.ground_albedo[3] = scene_ground_top(job->scene);
     scene_ground(job->scene, b.ground);
     b.display[0] = exp2f(r->exposure_ev);
     b.display[1] = (float)r->tone_map;

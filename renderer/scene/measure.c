@@ -19,12 +19,17 @@ float scene_floor(const struct scene *s)
     return scene_is_empty(s) ? stage : fminf(stage, s->blob.header->bounds_min[1]);
 }
 
+float scene_ground_top(const struct scene *s)
+{
+    return scene_is_empty(s) ? 0 : scene_floor(s);
+}
+
 void scene_ground(const struct scene *s, float ground[4])
 {
     float radius = scene_radius(s);
     scene_center(s, ground);
     /* A hair below the bounds, so that a floor of the scene itself hides it. */
-    ground[1] = (scene_is_empty(s) ? 0 : scene_floor(s)) - 1e-4f * radius;
+    ground[1] = scene_ground_top(s) - 1e-4f * radius;
     ground[3] = GROUND * radius;
 }
 

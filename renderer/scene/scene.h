@@ -107,6 +107,9 @@ void scene_measure(struct scene *scene);
 float scene_floor(const struct scene *scene);
 /* The square that a ground is: centre x, height, centre z, half side. */
 void scene_ground(const struct scene *scene, float ground[4]);
+/* Where its light and shadow are, m. It lies a hair lower only so that a floor hides it: a look
+ * through that gap would find what is under the floor, in the dark. */
+float scene_ground_top(const struct scene *scene);
 
 /* What a material has in one of the geometry passes' texture units. */
 const struct psc_texture_ref *scene_slot(const struct psc_material *material, int unit);

@@ -195,6 +195,18 @@ class Contact(unittest.TestCase):
             with self.subTest(method=method):
                 self.assertLessEqual(sum(seen[i] >= 128 for i in inside), 0.1 * len(inside))
 
+    def test_ground_at_the_foot_of_a_slab_is_lit(self):
+        """The light comes from behind the camera: nothing before the slab's middle lies in shadow."""
+        for turn in (0.3, 0.6, 0.9):
+            scene = self.d.upload(solids(((2, 0.1, 2), (0, 0.05, 0), turn)))
+            request = {"ground": True, "width": 640, "height": 480,
+                       "camera": {"eye": [0, 2, 4], "target": [0, 0.1, 0], "fov_y_deg": 35},
+                       "lights": [{**SUN, "position": [0, 4, 4]}]}
+            for method, most in (("raytraced", 0), ("hard", 3), ("pcss", 3)):
+                with self.subTest(turn=turn, method=method):
+                    seen = self.visibility(scene, request, method)
+                    self.assertLessEqual(sum(v < 100 for v in seen[640 * 250:]), most)
+
     def test_bumps_have_no_specks(self):
         """Triangles of a rough surface are no casters that touch their neighbours."""
         scene = self.d.upload(bumpy_ball(120, 60))

@@ -66,9 +66,30 @@ static void set_matrix(GLuint program, const mat4 matrix)
     gl.ProgramUniformMatrix4fv(program, LOCATION_TO_CLIP, 1, GL_FALSE, (const float *)matrix);
 }
 
-/* ground: the program that draws it, or 0. */
+/* Programs of the ground; 0: none. */
+struct ground_pass {
+    GLuint seen, top;
+};
+
+static void draw_ground(struct technique_ctx *ctx, const struct view *view,
+    const struct ground_pass *ground, const struct gbuffer *g)
+{
+    const GLuint programs[] = {ground->seen, ground->top};
+    gl.BindVertexArray(ctx->empty_array);
+    for (int i = 0; i < 2; i++) {
+        if (i) {
+            gl.BindFramebuffer(GL_FRAMEBUFFER, g->depth.framebuffer);
+            gl.BindTextureUnit(UNIT_ALBEDO, g->albedo.texture.name);
+        }
+        set_matrix(programs[i], view->world_to_clip);
+        gl.UseProgram(programs[i]);
+        gl.DrawArrays(GL_TRIANGLE_STRIP, 0, 4);
+    }
+}
+
 static uint64_t draw_piece(struct technique_ctx *ctx, struct scene *scene, const struct view *view,
-    const struct scene_pass *pass, GLuint ground, struct pass_bands *bands, const struct gbuffer *g)
+    const struct scene_pass *pass, const struct ground_pass *ground, struct pass_bands *bands,
+    const struct gbuffer *g)
 {
     struct cull_view cull;
     view_to_cull(view, &cull);
@@ -83,12 +104,8 @@ static uint64_t draw_piece(struct technique_ctx *ctx, struct scene *scene, const
     gl.DepthFunc(GL_GREATER);
     pass_bands_aim(bands);
     uint64_t triangles = scene_draw(scene, &cull, pass, &bands->piece);
-    if (ground && !bands->piece.more) {
-        set_matrix(ground, view->world_to_clip);
-        gl.UseProgram(ground);
-        gl.BindVertexArray(ctx->empty_array);
-        gl.DrawArrays(GL_TRIANGLE_STRIP, 0, 4);
-    }
+    if (ground && !bands->piece.more)
+        draw_ground(ctx, view, ground, g);
     gl.Disable(GL_DEPTH_TEST);
     return triangles;
 }
@@ -111,8 +128,13 @@ bool pass_gbuffer(struct technique_ctx *ctx, struct scene *scene, const struct v
     struct scene_pass pass = {.full = true, .blended = how->kind == GBUFFER_LAYER};
     pass.opaque = program(ctx, "", emission, GBUFFER_HASHED, error);
     pass.textured = program(ctx, "#define TEXTURED\n", emission, how->kind, error);
-    GLuint flat = program(ctx, "#define GROUND\n", emission, GBUFFER_HASHED, error);
-    if (!pass.opaque || !pass.textured || !flat)
+    struct gl_program_desc top = {.vertex = "geometry.vert",
+        .fragment = "ground_top.frag",
+        .defines = "#define FULL\n#define GROUND\n#define TOP\n"};
+    const struct ground_pass ground = {
+        program(ctx, "#define GROUND\n", emission, GBUFFER_HASHED, error),
+        gl_programs_get(ctx->programs, &top, error)};
+    if (!pass.opaque || !pass.textured || !ground.seen || !ground.top)
         return false;
     gl_timer_begin(&ctx->timer, PEN_STAGE_GBUFFER, "gbuffer");
     static const float zero[4] = {0};
@@ -127,7 +149,8 @@ bool pass_gbuffer(struct technique_ctx *ctx, struct scene *scene, const struct v
             gl.BindTextureUnit(UNIT_SOLID, how->solid->name);
             gl.ProgramUniform1i(pass.textured, LOCATION_LAST, how->last);
         }
-        g->triangles += draw_piece(ctx, scene, view, &pass, how->ground ? flat : 0, &bands, g);
+        g->triangles +=
+            draw_piece(ctx, scene, view, &pass, how->ground ? &ground : NULL, &bands, g);
         ok = pass_bands_next(ctx, &bands, &more, error);
     }
     gl_timer_end(&ctx->timer);

@@ -56,6 +56,7 @@ static void cover_ground(const struct scene *scene, const struct cover *cover)
 {
     float g[4];
     scene_ground(scene, g);
+    g[1] = scene_ground_top(scene);
     const float corners[4][3] = {{g[0] - g[3], g[1], g[2] + g[3]}, {g[0] + g[3], g[1], g[2] + g[3]},
         {g[0] - g[3], g[1], g[2] - g[3]}, {g[0] + g[3], g[1], g[2] - g[3]}};
     cover_one_triangle(corners, cover);
@@ -102,7 +103,7 @@ bool pass_places(struct technique_ctx *ctx, struct scene *scene, const struct vi
     struct scene_pass pass = {.opaque = program(ctx, NULL, error),
         .textured = program(ctx, alpha, error),
         .blended = kind == PLACES_BLENDED};
-    GLuint flat = program(ctx, "#define FULL\n#define GROUND\n", error), block;
+    GLuint flat = program(ctx, "#define FULL\n#define GROUND\n#define TOP\n", error), block;
     if (!pass.opaque || !pass.textured || !flat)
         return false;
     gl_timer_begin(&ctx->timer, PEN_STAGE_GBUFFER, "edge places");

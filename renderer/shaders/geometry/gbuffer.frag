@@ -86,10 +86,11 @@ void main()
     float threshold = pixel_threshold(gl_FragCoord.xyz, uint(view.display.z));
 #endif
 #ifdef LAYER
-    // A little is taken twice, rather than by neither where two programs round differently.
+    // A little is taken twice, rather than by neither where two programs round differently or where
+    // it lies on the ground.
     float before = texelFetch(depth_before, ivec2(gl_FragCoord.xy), 0).r;
     float solid = texelFetch(depth_solid, ivec2(gl_FragCoord.xy), 0).r;
-    if (gl_FragCoord.z >= before || gl_FragCoord.z < solid || base.a > solid_alpha + 1e-5)
+    if (gl_FragCoord.z >= before || gl_FragCoord.z < 0.99999 * solid || base.a > solid_alpha + 1e-5)
         discard;
     threshold = last != 0 ? threshold : 0.0;
     cover = last != 0 ? 1.0 : base.a;

@@ -31,8 +31,14 @@ void main()
 {
 #ifdef GROUND
     vec2 corner = vec2((gl_VertexID & 1) * 2 - 1, (gl_VertexID >> 1) * 2 - 1);
-    vec3 world = vec3(view.ground.x + corner.x * view.ground.w, view.ground.y,
-        view.ground.z - corner.y * view.ground.w);
+#ifdef TOP
+    corner *= 0.99; // and nowhere where none is drawn
+    float height = view.ground_albedo.w;
+#else
+    float height = view.ground.y;
+#endif
+    vec3 world = vec3(
+        view.ground.x + corner.x * view.ground.w, height, view.ground.z - corner.y * view.ground.w);
     v_uv = vec4(0.0);
     v_color = vec4(1.0);
     v_material = 0u;

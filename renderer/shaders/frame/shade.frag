@@ -164,7 +164,7 @@ float open_to_sky(ivec2 pixel, float depth)
     return sum / weight;
 }
 
-vec3 sky_reflected(Reflectance m, vec3 n, vec3 v, float open)
+vec3 sky_reflected(Reflectance m, vec3 p, vec3 n, vec3 v, float open)
 {
     float nv = clamp(dot(n, v), 1e-3, 1.0);
     // Light that bounces between bright surfaces fills their corners (Jimenez et al. 2016, 4).
@@ -173,8 +173,8 @@ vec3 sky_reflected(Reflectance m, vec3 n, vec3 v, float open)
     vec3 seen = max(vec3(open), ((open * a + b) * open + c) * open);
     // A narrow lobe is hidden less gradually than a hemisphere (Lagarde and de Rousiers 2014).
     float hidden = clamp(pow(nv + open, exp2(-16.0 * sqrt(m.alpha) - 1.0)) - 1.0 + open, 0.0, 1.0);
-    return m.diffuse * sky_diffuse(n) * seen + sky_reflectance(m.f0, sqrt(m.alpha), nv) *
-                                                   sky_specular(reflect(-v, n), m.alpha) * hidden;
+    vec3 mirrored = sky_specular(p, reflect(-v, n), m.alpha) * hidden;
+    return m.diffuse * sky_diffuse(n) * seen + sky_reflectance(m.f0, sqrt(m.alpha), nv) * mirrored;
 }
 #endif
 
@@ -202,10 +202,10 @@ void main()
     vec3 sum = view.ambient.rgb * (m.diffuse + m.f0) * surface.b;
 #ifdef SKY
     if (hit)
-        sum += surface.b * sky_reflected(m, n, v, open_to_sky(pixel, depth));
+        sum += surface.b * sky_reflected(m, p, n, v, open_to_sky(pixel, depth));
 #ifdef CATCHER
     if (catches)
-        unshadowed += surface.b * sky_reflected(m, n, v, 1.0);
+        unshadowed += surface.b * sky_reflected(m, p, n, v, 1.0);
 #endif
 #endif
 #ifdef EMIT

@@ -22,15 +22,30 @@ vec3 sky_diffuse(vec3 n)
 // kept off the rest.
 const float sky_mirrored = 2.0;
 
-// Mean over the lobe of a surface of squared roughness a around its mirror direction r. The lobe is
-// a spherical Gaussian of this sharpness (Wang et al. 2009), and the product of two is one again.
-vec3 sky_specular(vec3 r, float a)
+// What a mirror at p shows in direction r: a floor that is lit around the subject, a dark horizon,
+// and walls that are lit upwards. Where on the floor a reflection ends gives flat faces a gradient.
+float sky_mirror(vec3 p, vec3 r, float blur)
+{
+    float reach = max(view.ground.w, 1e-9) / 12.0; // the radius of what stands there
+    float far = max(p.y - view.ground.y, 0.0) / max(-r.y, 1e-3);
+    vec2 q = p.xz - view.ground.xz + r.xz * far;
+    float floor_light = mix(0.22, 0.7, exp(-dot(q, q) / (9.0 * reach * reach)));
+    float wall_light = mix(0.16, 0.95, smoothstep(0.0, 0.6, r.y));
+    return mix(floor_light, wall_light, smoothstep(-blur, blur, r.y));
+}
+
+// Mean over the lobe of a surface of squared roughness a at p, around its mirror direction r. The
+// lobe is a spherical Gaussian of this sharpness (Wang et al. 2009), and the product of two is one
+// again.
+vec3 sky_specular(vec3 p, vec3 r, float a)
 {
     float lobe = 0.5 / (a * a + 1e-4), narrow = lobe / (1.0 + lobe);
     float e = shade.sky_gradient.x + shade.sky_gradient.z / 3.0 +
               narrow * shade.sky_gradient.y * r.y +
               narrow * narrow * narrow * shade.sky_gradient.z * (r.y * r.y - 1.0 / 3.0);
     e *= sky_mirrored;
+    if (a < 0.5)
+        e = mix(sky_mirror(p, r, 0.02 + a), e, smoothstep(0.0, 0.5, a));
     for (int i = 0; i < SKY_BOXES; i++) {
         float share = lobe / (lobe + sky_sharpness[i]);
         e += shade.sky_box[i].w * share *

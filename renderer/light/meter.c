@@ -53,16 +53,30 @@ static float irradiance(const struct light *light, const float p[3], const float
     return value * glm_vec3_dot((float *)n, to) / (d * fmaxf(d2 + area / GLM_PIf, 1e-20f));
 }
 
-struct reading {
-    float level; /* radiance of a white surface */
-    float lit;   /* the share of the content's surface that faces a light and is reached by it */
-};
-
 static int ascending(const void *a, const void *b)
 {
     float x = *(const float *)a, y = *(const float *)b;
     return (x > y) - (x < y);
 }
+
+/* What half of the surface shines more than: a lamp in a scene counts for nothing. */
+static float glow_level(const struct scene *scene)
+{
+    float found[OUTLINE_SAMPLES], most = 0;
+    for (uint32_t i = 0; i < scene->stage->moment_count; i++) {
+        const struct outline_samples *samples = &scene->stage->moments[i].samples;
+        for (uint32_t k = 0; k < samples->count; k++)
+            found[k] = samples->at[k].glow;
+        qsort(found, samples->count, sizeof *found, ascending);
+        most = samples->count ? fmaxf(most, found[(samples->count - 1) / 2]) : most;
+    }
+    return most;
+}
+
+struct reading {
+    float level; /* radiance of a white surface */
+    float lit;   /* the share of the content's surface that faces a light and is reached by it */
+};
 
 /* What four fifths of the irradiances stay below that are not next to nothing (outside a cone, behind
  * an emitter), and a third more; 0 where no light reaches anything. *lit: the share of these. */
@@ -169,6 +183,8 @@ static float fill_of(float lit)
     return glm_lerp(FILL_OF_BEAMS, FILL, t * t * (3 - 2 * t));
 }
 
+#define GLOW 0.9f /* a lamp is whiter than a white wall, but keeps its colour */
+
 /* What faces the lights squarely comes out just below white, with the sky's share on top. The key
  * light is made to measure: its level is 1. */
 void light_choose_exposure(struct pen_request *r, const struct light *lights, uint32_t count,
@@ -177,9 +193,9 @@ void light_choose_exposure(struct pen_request *r, const struct light *lights, ui
     bool key_light = scenes_own && !scene->blob.light_count;
     struct reading found =
         key_light ? (struct reading){1, 1} : meter(lights, count, scenes_own, scene);
-    float level = found.level;
+    float level = found.level, shown = fmaxf(level, GLOW * glow_level(scene));
     if (r->exposure_ev == PEN_AUTO)
-        r->exposure_ev = glm_clamp(log2f(0.72f / level), -24, 24);
+        r->exposure_ev = glm_clamp(log2f(0.72f / shown), -24, 24);
     if (r->sky_level == PEN_AUTO)
         r->sky_level = fminf(key_light ? level : fill_of(found.lit) * level, 1e6f);
 }

@@ -16,7 +16,8 @@ float scene_floor(const struct scene *s)
     float stage = s->stage->floor, rest = s->rest_stage.floor + (float)away;
     if (stage - rest < GROUND * scene_radius(s)) /* else it is not seen */
         stage = fminf(stage, rest);
-    return scene_is_empty(s) ? stage : fminf(stage, s->blob.header->bounds_min[1]);
+    bool alone = scene_is_empty(s) || s->stage->apart;
+    return alone ? stage : fminf(stage, s->blob.header->bounds_min[1]);
 }
 
 float scene_ground_top(const struct scene *s)

@@ -1,4 +1,6 @@
 #include "renderer/scene/outline.h"
+#include "protocol/srgb.h"
+#include "renderer/blob/check.h"
 #include <math.h>
 #include <string.h>
 
@@ -88,9 +90,24 @@ static float area_normal(const struct psc_scene *s, const struct psc_instance *i
     for (int k = 0; k < 3; k++)
         normal[k] = a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3];
     float twice = sqrtf(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]);
+    float side = instance->flags & PSC_MIRRORED ? -1 : 1;
     for (int k = 0; k < 3; k++)
-        normal[k] /= fmaxf(twice, 1e-30f);
+        normal[k] *= side / fmaxf(twice, 1e-30f);
     return 0.5f * twice;
+}
+
+static float glow_of(const struct psc_scene *s, const struct psc_material *m)
+{
+    float mean[3] = {1, 1, 1};
+    if (m->emission.texture >= 0) { /* the last level is the mean, as near as 8 bits have it */
+        const struct psc_image *image = &s->images[s->textures[m->emission.texture].image];
+        const uint8_t *texel =
+            s->texels + image->first_byte + mip_chain_bytes(image->width, image->height) - 4;
+        for (int k = 0; k < 3; k++)
+            mean[k] = pen_srgb_decodef(texel[k] / 255.0f);
+    }
+    return fmaxf(
+        m->emissive[0] * mean[0], fmaxf(m->emissive[1] * mean[1], m->emissive[2] * mean[2]));
 }
 
 /* Walks over (some of) the triangles inside. With `samples`, takes one whenever another `stride` of
@@ -103,6 +120,7 @@ static double walk(struct outline_samples *o, const struct psc_scene *s, const f
     for (uint32_t n = 0; n < s->instance_count; n++) {
         const struct psc_primitive *p = &s->primitives[s->instances[n].primitive];
         uint64_t triangles = p->index_count / 3;
+        float glow = take ? glow_of(s, &s->materials[p->material]) : 0;
         for (uint64_t i = (step - at % step) % step; i < triangles; i += step) {
             float center[3], normal[3];
             float one =
@@ -112,7 +130,10 @@ static double walk(struct outline_samples *o, const struct psc_scene *s, const f
             area += one;
             for (; take && next < area && o->count < OUTLINE_SAMPLES; next += stride) {
                 memcpy(o->at[o->count].point, center, sizeof center);
-                memcpy(o->at[o->count++].normal, normal, sizeof normal);
+                memcpy(o->at[o->count].normal, normal, sizeof normal);
+                o->at[o->count].glow = glow;
+                o->at[o->count++].one_sided =
+                    !(s->materials[p->material].flags & (uint32_t)PSC_DOUBLE_SIDED);
             }
         }
         at += triangles;

@@ -12,10 +12,12 @@ struct outline {
     uint32_t extreme_count; /* all, or 0 */
 };
 
-/* Spread evenly over the area; normals are unit length, their sign that of the winding. */
+/* Spread evenly over the area; normals are unit length, towards the front. */
 struct outline_samples {
     struct {
         float point[3], normal[3];
+        float glow;     /* radiance of its own in the brightest channel, a texture's in the mean */
+        bool one_sided; /* not seen from behind */
     } at[OUTLINE_SAMPLES];
     uint32_t count;
 };

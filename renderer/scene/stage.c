@@ -2,6 +2,7 @@
 #include "protocol/memory.h"
 #include "renderer/blob/bounds.h"
 #include "renderer/pose/pose.h"
+#include "renderer/scene/content.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -16,25 +17,6 @@ static void merge(float to[2][3], const float box[2][3])
         to[0][k] = fminf(to[0][k], box[0][k]);
         to[1][k] = fmaxf(to[1][k], box[1][k]);
     }
-}
-
-/* Without what lies flat at the bottom, or below `ground`, where others stand at other moments. */
-static void find_content(const struct psc_scene *scene, const float (*instance_bounds)[2][3],
-    float ground, float content[2][3])
-{
-    const struct psc_header *h = scene->header;
-    float flat = 1e-4f * (h->bounds_max[1] - h->bounds_min[1]);
-    float bottom = fmaxf(h->bounds_min[1], ground) + flat;
-    psc_bounds_clear(content[0], content[1]);
-    for (uint32_t i = 0; i < scene->instance_count; i++)
-        if (instance_bounds[i][1][1] > bottom)
-            merge(content, instance_bounds[i]);
-    if (content[0][1] <= content[1][1]) {
-        content[0][1] = h->bounds_min[1]; /* it stands on that floor */
-        return;
-    }
-    memcpy(content[0], h->bounds_min, sizeof content[0]);
-    memcpy(content[1], h->bounds_max, sizeof content[1]);
 }
 
 static void start(struct scene_stage *stage, uint32_t moments, const double origin[3])
@@ -60,7 +42,8 @@ static void add_moment(struct scene_stage *stage, const struct psc_scene *scene,
 {
     const struct psc_header *h = scene->header;
     struct scene_moment *moment = &stage->moments[stage->moment_count++];
-    float content[2][3], shift[3];
+    struct content content;
+    float shift[3];
     moment->light_count = scene->light_count < PEN_MAX_LIGHTS ? scene->light_count : PEN_MAX_LIGHTS;
     for (uint32_t i = 0; i < moment->light_count; i++)
         moment->lights[i] = scene->lights[i].light;
@@ -68,12 +51,13 @@ static void add_moment(struct scene_stage *stage, const struct psc_scene *scene,
         return;
     for (int k = 0; k < 3; k++)
         shift[k] = (float)(h->origin[k] - stage->origin[k]);
-    find_content(scene, instance_bounds, ground - shift[1], content);
-    outline_grow(&stage->outline, scene, (const float(*)[3])content, shift);
-    outline_sample(&moment->samples, scene, (const float(*)[3])content, shift);
-    stage->floor = fminf(stage->floor, h->bounds_min[1] + shift[1]);
-    move_box(content, shift);
-    merge(stage->content, (const float(*)[3])content);
+    content_find(scene, instance_bounds, ground - shift[1], &content);
+    outline_grow(&stage->outline, scene, (const float(*)[3])content.box, shift);
+    outline_sample(&moment->samples, scene, (const float(*)[3])content.box, shift);
+    stage->floor = fminf(stage->floor, content.floor + shift[1]);
+    stage->apart |= content.apart;
+    move_box(content.box, shift);
+    merge(stage->content, (const float(*)[3])content.box);
 }
 
 void stage_make(

@@ -12,10 +12,10 @@ struct scene_moment {
 };
 
 struct scene_stage {
-    double origin[3];    /* in the file's world, of all that follows */
-    float content[2][3]; /* world bounds without a flat floor that everything stands on; min > max:
-                            empty */
-    float floor;         /* the lowest point; infinite: empty */
+    double origin[3];       /* in the file's world, of all that follows */
+    float content[2][3];    /* world bounds of what it is about (content.h); min > max: empty */
+    float floor;            /* its lowest point; infinite: empty */
+    bool apart;             /* other things may lie below the floor */
     struct outline outline; /* of the content */
     struct scene_moment *moments;
     uint32_t moment_count;

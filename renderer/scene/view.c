@@ -87,6 +87,38 @@ static struct framing collect(
     return f;
 }
 
+/* How much of the content's surface shows its front to a view from there. */
+static float shown_from(const struct scene *scene, float azimuth, float elevation)
+{
+    const float to[3] = {
+        sinf(azimuth) * cosf(elevation), sinf(elevation), cosf(azimuth) * cosf(elevation)};
+    float sum = 0;
+    for (uint32_t i = 0; scene->stage->moment_count && i < scene->stage->moments[0].samples.count;
+         i++) {
+        float facing =
+            glm_vec3_dot((float *)scene->stage->moments[0].samples.at[i].normal, (float *)to);
+        bool one_sided = scene->stage->moments[0].samples.at[i].one_sided;
+        sum += one_sided ? fmaxf(facing, 0) : fabsf(facing);
+    }
+    return sum;
+}
+
+#define LEAST_SHOWN 0.3f /* of what another side shows, or that one is taken */
+
+/* Of something that is seen from one side only, the side it is seen from. */
+static void turn_to_front(struct pen_camera *c, const struct scene *scene)
+{
+    float elevation = glm_rad(c->elevation_deg), usual = c->azimuth_deg, most = 0, best = usual;
+    float shown = shown_from(scene, glm_rad(usual), elevation);
+    for (int turn = 180; turn >= -90; turn -= 90) { /* the back first */
+        float there = shown_from(scene, glm_rad(usual + (float)turn), elevation);
+        if (there > 1.01f * most)
+            most = there, best = usual + (float)turn;
+    }
+    if (shown < LEAST_SHOWN * most)
+        c->azimuth_deg = best;
+}
+
 static void frame_content(struct pen_camera *c, const struct scene *scene, float aspect)
 {
     float center[3], eye[3], target[3], distance = (float)c->distance, move[2] = {0, 0};
@@ -132,6 +164,8 @@ bool view_resolve(struct view *v, struct pen_camera *c, const struct scene *scen
         memcpy(c->up, from->up, sizeof c->up);
         c->fov_y_deg = from->fov_y_deg;
     } else if (c->mode == PEN_CAMERA_AUTO || c->mode == PEN_CAMERA_ORBIT) {
+        if (c->mode == PEN_CAMERA_AUTO)
+            turn_to_front(c, scene);
         frame_content(c, scene, v->aspect);
     }
     c->mode = PEN_CAMERA_LOOK_AT;

@@ -82,7 +82,9 @@ struct job_store *jobs_store(struct jobs *j, struct pen_error *error)
     pthread_mutex_lock(&j->lock);
     struct job_store *store = j->store;
     if (!store)
-        pen_fail(error, PEN_UNAVAILABLE, "", "%s", j->why_none.message);
+        pen_fail(error, j->why_none.code, "", "%s", j->why_none.message);
+    if (!store && error)
+        error->retry_after_s = JOBS_OPEN_S;
     pthread_mutex_unlock(&j->lock);
     return store;
 }
@@ -147,19 +149,22 @@ bool jobs_submit(struct jobs *j, const struct job_order *order, uint8_t id[PEN_I
         .created_s = jobs_now_s()};
     make_id(job.id);
     memcpy(job.scene, job_plan_scene(plan), PEN_ID_BYTES);
-    memcpy(id, job.id, PEN_ID_BYTES);
+    uint8_t own[PEN_ID_BYTES];
+    memcpy(own, job.id, PEN_ID_BYTES);
     char *body = memcpy(pen_alloc_zero(order->bytes + 1, 1), order->body, order->bytes);
     bool ok = job_store_add(store, &job, body, order->key, &j->config.limits, error);
     free(body);
+    memcpy(id, job.id, PEN_ID_BYTES);
+    bool is_new = ok && !memcmp(id, own, PEN_ID_BYTES);
     struct running *running = jobs_make_running(j, &job, plan);
     pthread_mutex_lock(&j->lock);
-    if (ok) {
+    if (is_new) {
         running->next = j->incoming;
         j->incoming = running;
         running = NULL;
         j->woken = true;
         pthread_cond_signal(&j->news);
-    } else if (error && !error->retry_after_s) {
+    } else if (!ok && error && !error->retry_after_s) {
         error->retry_after_s = retry_s(j);
     }
     pthread_mutex_unlock(&j->lock);

@@ -4,6 +4,8 @@
 #include "server/queue/compare.h"
 #include <pthread.h>
 
+#define JOBS_OPEN_S 10 /* until a database that cannot be used is tried again */
+
 enum frame_state { FRAME_TODO, FRAME_IN_FLIGHT, FRAME_DONE };
 
 /* A job that is not over. */

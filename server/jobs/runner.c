@@ -17,7 +17,6 @@
 #define IDLE_NS (5 * CLOCK_S)
 #define EXPIRY_NS (5 * CLOCK_S)
 #define BEAT_NS (15 * CLOCK_S) /* proxies close what is silent for longer */
-#define OPEN_NS (10 * CLOCK_S) /* until the database is tried again */
 #define RECORD_NS (2 * CLOCK_S)
 #define PATIENCE_NS (365ull * 24 * 3600 * CLOCK_S)
 
@@ -466,7 +465,7 @@ void jobs_open_store(struct jobs *j)
     char path[4096];
     if (clock_now_ns() < j->open_due_ns)
         return;
-    j->open_due_ns = clock_now_ns() + OPEN_NS;
+    j->open_due_ns = clock_now_ns() + JOBS_OPEN_S * CLOCK_S;
     if (j->root < 0)
         j->root = job_files_open_root(j->config.store, &error);
     snprintf(path, sizeof path, "%s/jobs/jobs.db", j->config.store);

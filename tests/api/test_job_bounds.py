@@ -2,7 +2,9 @@
 import io
 import json
 import os
+import signal
 import sqlite3
+import threading
 import unittest
 import zipfile
 
@@ -139,6 +141,31 @@ class Bounds(unittest.TestCase):
         self.kill_9(d)
         self.assertEqual(post(d, "/v1/jobs", body, Idempotency_Key="k").headers["Location"], first)
 
+    def test_one_key_at_the_same_time(self):
+        d, scene = self.daemon()
+        body = {"scene": scene, **TINY, "sequence": {"frames": 2}}
+        found = []
+        ask = lambda: found.append(post(d, "/v1/jobs", body, Idempotency_Key="k"))
+        threads = [threading.Thread(target=ask) for _ in range(12)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        self.assertEqual([a.status for a in found], 12 * [202])
+        self.assertEqual(len({a.headers["Location"] for a in found}), 1)
+        self.assertEqual(d.get("/v1/jobs").json()["total"], 1)
+
+    def test_workers_that_die(self):
+        d, scene = self.daemon()
+        id = start(d, scene, {"frames": 60, "turntable": {}}, antialias=8)["id"]
+        for kill in range(4):
+            wait(lambda: job(d, id)["frames"]["done"] >= 10 * kill + 3)
+            os.kill(d.worker(), signal.SIGKILL)
+        done = ended(d, id)
+        self.assertEqual((done["state"], done["frames"]["done"]), ("successful", 60), done)
+        for i in (0, 30, 59):
+            self.assertEqual(frame(d, id, i), single(d, id, scene, i))
+
     def test_drained_in_the_middle(self):
         d, scene = self.daemon()
         id = start(d, scene, {"frames": 200, "turntable": {}}, antialias=4)["id"]
@@ -191,14 +218,34 @@ class Bounds(unittest.TestCase):
         database.execute("ROLLBACK")
         self.assertEqual(ended(d, id)["frames"]["done"], 60)
 
-    def test_tokens(self):
+    def with_tokens(self, *flags):
         token_file = os.path.join(Daemon(start=False).folder, "tokens")
         with open(token_file, "w") as file:
             file.write("a aaaaaaaaaaaaaaaaaaaa\nb bbbbbbbbbbbbbbbbbbbb\n")
         os.chmod(token_file, 0o600)
-        d = Daemon("--token-file=" + token_file)
+        d = Daemon("--token-file=" + token_file, *flags)
         self.addCleanup(d.kill)
-        a, b = ({"Authorization": "Bearer " + 20 * c} for c in "ab")
+        return (d, *({"Authorization": "Bearer " + 20 * c} for c in "ab"))
+
+    def test_clients_take_turns(self):
+        """A client's short job does not wait for another's long one, whatever that has queued."""
+        d, a, b = self.with_tokens()
+        scene = d.call("POST", "/v1/scenes", grid_scene(4), a).json()["id"]
+        ask = lambda who, frames: d.call("POST", "/v1/jobs", json.dumps({
+            "scene": scene, **TINY, "antialias": 8,
+            "sequence": {"frames": frames, "turntable": {}}}), who).headers["Location"]
+        see = lambda who, path: d.call("GET", path, headers=who).json()
+        long = [ask(a, 1000) for _ in range(3)]
+        wait(lambda: see(a, long[0])["state"] == "running")
+        short = ask(b, 10)
+        wait(lambda: see(b, short)["state"] == "successful", 60)
+        self.assertEqual(see(a, long[0])["state"], "running")
+        self.assertEqual(see(a, long[1])["frames"]["done"], 0)  # one after the other
+        for path in long:
+            d.call("DELETE", path, headers=a)
+
+    def test_tokens(self):
+        d, a, b = self.with_tokens()
         scene = d.call("POST", "/v1/scenes", grid_scene(4), a).json()["id"]
         answer = d.call("POST", "/v1/jobs", json.dumps({"scene": scene, **TINY}), a)
         path = answer.headers["Location"]

@@ -4,12 +4,15 @@ import json
 import os
 import struct
 import subprocess
+import sys
 import tempfile
 import unittest
 import zipfile
 
 import harness
 from harness import HEAVY, SMALL, Daemon, grid_scene, wait
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "../unit"))
+import pose_files
 from jobs import ASYNC, TINY, Events, ended, frame, job, post, single, start
 
 
@@ -170,6 +173,19 @@ class Jobs(unittest.TestCase):
         self.assertEqual(result.headers["Content-Type"], "image/webp")
         self.assertEqual(animation(result.body), [
             (stills, 33 + (i in (1, 4))) for i, stills in enumerate(map(still, pictures))])
+
+    def test_the_file_s_own_animation(self):
+        scene = self.d.upload(pose_files.skinned(11, 1, normals=False, floor=True))
+        name = self.d.get("/v1/scenes/" + scene).json()["animations"][0]["name"]
+        id = start(self.d, scene, {"frames": 4, "fps": 8}, animation=name, time_s=0.125,
+                   width=64, height=48)["id"]
+        self.assertEqual(ended(self.d, id)["state"], "successful")
+        pictures = [frame(self.d, id, i) for i in range(4)]
+        for i, picture in enumerate(pictures):
+            alone = self.d.render(scene, {**TINY, "width": 64, "height": 48, "animation": name,
+                                          "time_s": 0.125 * (1 + i)})
+            self.assertEqual(alone.body, picture, i)
+        self.assertEqual(len(set(pictures)), 4)
 
     def test_sequence_refused(self):
         refuse = lambda pointer, sequence, status=422, **request: self.problem(

@@ -1,10 +1,12 @@
 /* Any bytes as a request body, or (first byte 'q') as lines "key=value" of a query, or (first byte
- * 'c') as the body of a comparison. What is accepted must print to a body that reads back as the
+ * 'c') as the body of a comparison, or (first byte 's') of a sequence, each of whose frames is a
+ * request. What is accepted must print to a body that reads back as the
  * same request; what is refused must say why. */
 #include "protocol/json_compare.h"
 #include "protocol/json_request.h"
 #include "protocol/json_result.h"
 #include "protocol/json_scan.h"
+#include "protocol/json_sequence.h"
 #include "tests/unit/documents_catalogue.h"
 #include <stdlib.h>
 #include <string.h>
@@ -42,15 +44,44 @@ static void check_compare(const char *text, size_t bytes)
     REQUIRE(ok || (pen_code_blame(error.code) == PEN_BLAME_CALLER && error.message[0]));
 }
 
+static void check_round_trip(const struct pen_request *request)
+{
+    struct pen_request back;
+    struct pen_error error = {0};
+    char *text = pen_request_json(request, &fake_catalogue);
+    REQUIRE(pen_request_from_json(text, strlen(text), &fake_catalogue, &back, &error));
+    REQUIRE(!memcmp(request, &back, sizeof back));
+    free(text);
+}
+
+static void check_sequence(const char *text, size_t bytes)
+{
+    struct pen_error error = {0};
+    struct pen_sequence *s =
+        pen_sequence_from_json(text, bytes, &fake_catalogue, "none", false, &error);
+    REQUIRE((s != NULL) == (error.code == PEN_OK));
+    REQUIRE(s || (pen_code_blame(error.code) == PEN_BLAME_CALLER && error.message[0]));
+    for (uint32_t i = 0; s && i < s->options.frames; i += 1 + s->options.frames / 8) {
+        struct pen_request request;
+        pen_sequence_frame(s, i, &request);
+        check_round_trip(&request);
+    }
+    pen_sequence_destroy(s);
+}
+
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
-    struct pen_request request, back;
+    struct pen_request request;
     struct pen_error error = {0};
     bool ok;
     if (size && data[0] == 'c') {
         check_compare((const char *)data + 1, size - 1);
+        return 0;
+    }
+    if (size && data[0] == 's') {
+        check_sequence((const char *)data + 1, size - 1);
         return 0;
     }
     if (size && data[0] == 'q') {
@@ -70,9 +101,6 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         free(problem);
         return 0;
     }
-    char *text = pen_request_json(&request, &fake_catalogue);
-    REQUIRE(pen_request_from_json(text, strlen(text), &fake_catalogue, &back, &error));
-    REQUIRE(!memcmp(&request, &back, sizeof back));
-    free(text);
+    check_round_trip(&request);
     return 0;
 }

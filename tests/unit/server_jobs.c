@@ -191,10 +191,17 @@ static void keys(void)
     CHECK(job_store_find_key(s, &key, 1000, &found, &has_job, id, NULL) && !found);
     CHECK(job_store_add(s, &job, "{}", &key, &plenty, NULL));
     CHECK(job_store_find_key(s, &key, 9000, &found, &has_job, id, NULL) && found && has_job);
-    CHECK(id[0] == 1); /* as long as the job is there */
+    CHECK(id[0] == 1);                                        /* as long as the job is there */
+    struct job second = make(2, 7, 1), third = make(3, 7, 1); /* asked for at the same time */
+    CHECK(job_store_add(s, &second, "{}", &key, &plenty, NULL) && second.id[0] == 1);
     struct job_key other = key;
     struct pen_error error = {0};
     other.print[0] = 2;
+    CHECK(!job_store_add(s, &third, "{}", &other, &plenty, &error) && error.code == PEN_INVALID);
+    memset(&error, 0, sizeof error);
+    CHECK(
+        !job_store_get(s, third.id, &job, NULL) && !job_store_get(s, make(2, 0, 0).id, &job, NULL));
+    job = make(1, 7, 1);
     CHECK(!job_store_find_key(s, &other, 1000, &found, &has_job, id, &error));
     CHECK(error.code == PEN_INVALID);
     other.client = 8; /* somebody else's */

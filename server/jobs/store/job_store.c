@@ -220,6 +220,48 @@ static bool has_room(struct job_store *s, const struct job *job, const struct jo
     return false;
 }
 
+struct key_read {
+    char print[PEN_ID_HEX + 1], job[PEN_ID_HEX + 1];
+    bool found;
+};
+
+static void read_key(void *context, const struct database_value *columns)
+{
+    struct key_read *into = context;
+    copy(into->print, sizeof into->print, columns[0].text);
+    copy(into->job, sizeof into->job, columns[1].text);
+    into->found = true;
+}
+
+/* As job_store_find_key, with the lock held. */
+static bool find_key(struct job_store *s, const struct job_key *key, int64_t now_s, bool *found,
+    bool *has_job, uint8_t id[PEN_ID_BYTES], struct pen_error *error)
+{
+    struct hex print = hex_of(key->print);
+    struct database_value values[] = {NUMBER(key->client), TEXT(key->text), NUMBER(now_s)};
+    struct key_read read = {0};
+    bool ok = database_run(s->database,
+        "SELECT print, job FROM keys WHERE client = $1 AND name = $2 AND (expires > $3 OR "
+        "job <> '')",
+        values, COUNT(values), read_key, &read, error);
+    *found = ok && read.found;
+    *has_job = *found && pen_id_from_hex(read.job, id);
+    if (*found && strcmp(print.text, read.print))
+        return pen_fail(error, PEN_INVALID, "",
+            "This Idempotency-Key came with another request before: a new request needs a new "
+            "one.");
+    return ok;
+}
+
+bool job_store_find_key(struct job_store *s, const struct job_key *key, int64_t now_s, bool *found,
+    bool *has_job, uint8_t id[PEN_ID_BYTES], struct pen_error *error)
+{
+    pthread_mutex_lock(&s->lock);
+    bool ok = find_key(s, key, now_s, found, has_job, id, error);
+    pthread_mutex_unlock(&s->lock);
+    return ok;
+}
+
 static bool put_key(
     struct job_store *s, const struct job_key *key, const char *job, struct pen_error *error)
 {
@@ -238,24 +280,35 @@ static bool put_key(
                client, COUNT(client), NULL, NULL, error);
 }
 
-bool job_store_add(struct job_store *s, const struct job *job, const char *body,
-    const struct job_key *key, const struct job_limits *limits, struct pen_error *error)
+static bool insert(struct job_store *s, const struct job *job, const char *body,
+    const struct job_key *key, struct pen_error *error)
 {
     struct hex id = hex_of(job->id), scene = hex_of(job->scene);
     struct database_value values[] = {TEXT(id.text), TEXT(scene.text), NUMBER(job->client),
         NUMBER(job->kind), NUMBER(job->frames), NUMBER(job->created_s), TEXT(body)};
+    return database_run(s->database,
+               "INSERT INTO jobs (id, scene, client, kind, state, frames, done, bytes, seq, "
+               "state_seq, created, ended, expires, settings, result_bytes, result_tag, "
+               "result_name, error_code, error_pointer, error_message, body) VALUES ($1, $2, "
+               "$3, $4, 0, $5, 0, 0, 1, 1, $6, 0, 0, '', 0, '', '', 0, '', '', $7)",
+               values, COUNT(values), NULL, NULL, error) &&
+           (!key || put_key(s, key, id.text, error));
+}
+
+bool job_store_add(struct job_store *s, struct job *job, const char *body,
+    const struct job_key *key, const struct job_limits *limits, struct pen_error *error)
+{
+    bool found = false, has_job = false;
+    uint8_t before[PEN_ID_BYTES];
     pthread_mutex_lock(&s->lock);
     bool begun = database_begin(s->database, error);
-    bool ok = begun && has_room(s, job, limits, error) &&
-              database_run(s->database,
-                  "INSERT INTO jobs (id, scene, client, kind, state, frames, done, bytes, seq, "
-                  "state_seq, created, ended, expires, settings, result_bytes, result_tag, "
-                  "result_name, error_code, error_pointer, error_message, body) VALUES ($1, $2, "
-                  "$3, $4, 0, $5, 0, 0, 1, 1, $6, 0, 0, '', 0, '', '', 0, '', '', $7)",
-                  values, COUNT(values), NULL, NULL, error) &&
-              (!key || put_key(s, key, id.text, error));
+    bool ok = begun &&
+              (!key || find_key(s, key, job->created_s, &found, &has_job, before, error)) &&
+              (has_job || (has_room(s, job, limits, error) && insert(s, job, body, key, error)));
     ok = begun && database_end(s->database, ok, error);
     pthread_mutex_unlock(&s->lock);
+    if (ok && has_job)
+        memcpy(job->id, before, PEN_ID_BYTES);
     return ok;
 }
 
@@ -393,8 +446,8 @@ bool job_store_add_frame(struct job_store *s, const uint8_t id[PEN_ID_BYTES],
                            values, 2, &there, error);
     if (ok && !there)
         ok = database_run(s->database,
-                 "INSERT INTO frames (job, number, seq, bytes, tag, name) SELECT $1, $2, seq + 1, "
-                 "$3, $4, $5 FROM jobs WHERE id = $1",
+                 "INSERT INTO frames (job, number, seq, bytes, tag, name) SELECT $1, CAST($2 AS "
+                 "BIGINT), seq + 1, CAST($3 AS BIGINT), $4, $5 FROM jobs WHERE id = $1",
                  values, COUNT(values), NULL, NULL, error) &&
              database_run(s->database,
                  "UPDATE jobs SET seq = seq + 1, done = (SELECT COUNT(*) FROM frames WHERE "
@@ -479,38 +532,6 @@ bool job_store_expire(struct job_store *s, int64_t now_s, uint8_t id[PEN_ID_BYTE
 }
 
 /* ---- keys ---- */
-
-struct key_read {
-    char print[PEN_ID_HEX + 1], job[PEN_ID_HEX + 1];
-    bool found;
-};
-
-static void read_key(void *context, const struct database_value *columns)
-{
-    struct key_read *into = context;
-    copy(into->print, sizeof into->print, columns[0].text);
-    copy(into->job, sizeof into->job, columns[1].text);
-    into->found = true;
-}
-
-bool job_store_find_key(struct job_store *s, const struct job_key *key, int64_t now_s, bool *found,
-    bool *has_job, uint8_t id[PEN_ID_BYTES], struct pen_error *error)
-{
-    struct hex print = hex_of(key->print);
-    struct database_value values[] = {NUMBER(key->client), TEXT(key->text), NUMBER(now_s)};
-    struct key_read read = {0};
-    bool ok = run(s,
-        "SELECT print, job FROM keys WHERE client = $1 AND name = $2 AND (expires > $3 OR "
-        "job <> '')",
-        values, COUNT(values), read_key, &read, error);
-    *found = ok && read.found;
-    *has_job = *found && pen_id_from_hex(read.job, id);
-    if (*found && strcmp(print.text, read.print))
-        return pen_fail(error, PEN_INVALID, "",
-            "This Idempotency-Key came with another request before: a new request needs a new "
-            "one.");
-    return ok;
-}
 
 bool job_store_keep_key(struct job_store *s, const struct job_key *key, struct pen_error *error)
 {

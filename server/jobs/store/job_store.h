@@ -70,10 +70,11 @@ struct job_store;
 struct job_store *job_store_open(const char *path, struct pen_error *error);
 void job_store_close(struct job_store *store); /* NULL is fine */
 
-/* A new job with its body, and the key that it was asked for with (NULL: none). Errors also:
- * PEN_TOO_MANY for what is the client's share, PEN_UNAVAILABLE for what is everybody's, with
+/* A new job with its body, and the key that it was asked for with (NULL: none). Where the key stands
+ * for a job already, since another request with it came in between, that one's id takes the place of
+ * job->id and nothing is added. Errors also: PEN_INVALID, as of job_store_find_key, PEN_TOO_MANY for what is the client's share, PEN_UNAVAILABLE for what is everybody's, with
  * retry_after_s where that is known: when the next one expires. */
-bool job_store_add(struct job_store *store, const struct job *job, const char *body,
+bool job_store_add(struct job_store *store, struct job *job, const char *body,
     const struct job_key *key, const struct job_limits *limits, struct pen_error *error);
 /* Errors also: PEN_NOT_FOUND. */
 bool job_store_get(struct job_store *store, const uint8_t id[PEN_ID_BYTES], struct job *job,

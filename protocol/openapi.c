@@ -48,19 +48,26 @@ static void write_parts(struct pen_json *json)
     }
 }
 
-static void write_events(struct pen_json *json)
+static void write_events(struct pen_json *json, const char *what)
 {
     pen_json_object(json, "text/event-stream");
     pen_json_object(json, "schema");
     pen_json_string(json, "type", "string");
-    pen_json_string(json, "description",
-        "`state`: the job changed its state; its data is the job. `frame`: one more is there; its "
-        "data has its `frame`, `bytes`, `href`, and of the job `done` and `total`. Every event has "
-        "an id: with the last one in Last-Event-ID, what came after it is sent. The stream ends "
-        "with the job, and when nothing is left to tell the answer is 204.");
+    pen_json_string(json, "description", what);
     pen_json_end(json);
     pen_json_end(json);
 }
+
+static const char job_events[] =
+    "`state`: the job changed its state; its data is the job. `frame`: one more is there; its "
+    "data has its `frame`, `bytes`, `href`, and of the job `done` and `total`. Every event has "
+    "an id: with the last one in Last-Event-ID, what came after it is sent. The stream ends "
+    "with the job, and when nothing is left to tell the answer is 204.";
+static const char live_events[] =
+    "`stats`, once a second: its data is an object with `unix_s`, `recent` (of the last ten "
+    "seconds' renders how many, and `total`, the spread of their times as in /v1/stats) and "
+    "`metrics`, every unlabelled number of /metrics by its name. Slow listeners get fewer. The "
+    "stream ends when the service shuts down.";
 
 static void write_content(struct pen_json *json, enum pen_body body)
 {
@@ -98,7 +105,10 @@ static void write_content(struct pen_json *json, enum pen_body body)
         write_media(json, "application/zip", NULL);
         break;
     case PEN_BODY_EVENTS:
-        write_events(json);
+        write_events(json, job_events);
+        break;
+    case PEN_BODY_LIVE:
+        write_events(json, live_events);
         break;
     case PEN_BODY_PAGE:
         write_media(json, "text/html", NULL);

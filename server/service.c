@@ -19,6 +19,7 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
+#define FEED_MS 1000     /* between live figures */
 #define STRAGGLER_MS 200 /* requests on their way when the last answer is out */
 #define CANCEL_MS 10000
 /* Descriptors that public connections leave to the rest of the daemon, and those that each listener
@@ -319,6 +320,7 @@ struct service *service_create(
     s->cache = result_cache_create(config->result_cache.bytes);
     s->part_cache = result_cache_create(PART_CACHE_BYTES);
     s->scheduler = scheduler_create(&limits, on_work, s);
+    s->feed = feed_create("stats", FEED_MS, routes_live_json, s);
     s->auto_runs = auto_runs_create(&(struct auto_parts){s->scheduler, s->store, catalogue});
     if (!start_importer(s, error) || !start_pool(s, error))
         goto fail;
@@ -344,6 +346,7 @@ static void drain(struct service *s, const bool *hurry)
     if (s->listener)
         http_listener_drain(s->listener);
     jobs_drain(s->jobs);
+    feed_close(s->feed);
     uint64_t end = clock_now_ns() + s->config->drain_timeout_ms * CLOCK_MS, quiet = 0;
     while (clock_now_ns() < end && !__atomic_load_n(hurry, __ATOMIC_ACQUIRE)) {
         uint64_t now = clock_now_ns();
@@ -382,6 +385,7 @@ void service_destroy(struct service *s, const bool *hurry)
         scheduler_cancel(s->scheduler);
     http_listener_destroy(s->listener);
     http_listener_destroy(s->admin);
+    feed_destroy(s->feed);
     jobs_destroy(s->jobs);
     worker_pool_destroy(s->pool);
     importer_destroy(s->importer); /* the pool's threads may still have asked for imports */

@@ -1,6 +1,6 @@
 #include "server/base/metrics.h"
-#include "protocol/json_writer.h"
 #include "protocol/memory.h"
+#include "server/base/clock.h"
 #include <pthread.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -33,6 +33,7 @@ struct method_numbers {
 };
 
 struct sample {
+    uint64_t at_ns;
     uint16_t method;
     float stage_ms[PEN_STAGES];
     float total_ms;
@@ -103,6 +104,7 @@ void metrics_render(struct metrics *m, const struct pen_result *result)
     uint32_t method = method_index(m, result->completed.technique);
     pthread_mutex_lock(&m->lock);
     struct sample *sample = &m->window[m->samples++ % WINDOW];
+    sample->at_ns = clock_now_ns();
     sample->method = (uint16_t)method;
     sample->total_ms = 0;
     m->methods[method].renders++;
@@ -229,6 +231,23 @@ static void write_spread(struct pen_json *json, const char *key, float *values, 
     pen_json_float(json, "p50_ms", values[count / 2]);
     pen_json_float(json, "p95_ms", values[(uint32_t)(0.95 * (count - 1) + 0.5)]);
     pen_json_float(json, "max_ms", values[count - 1]);
+    pen_json_end(json);
+}
+
+void metrics_write_recent(struct metrics *m, uint64_t ms, struct pen_json *json)
+{
+    float values[WINDOW];
+    uint32_t count = 0;
+    pthread_mutex_lock(&m->lock);
+    uint64_t now = clock_now_ns();
+    for (uint32_t i = 0; i < WINDOW && i < m->samples; i++)
+        if (now - m->window[i].at_ns <= ms * CLOCK_MS)
+            values[count++] = m->window[i].total_ms;
+    pthread_mutex_unlock(&m->lock);
+    pen_json_object(json, "recent");
+    pen_json_uint(json, "renders", count);
+    if (count)
+        write_spread(json, "total", values, count);
     pen_json_end(json);
 }
 

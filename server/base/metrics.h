@@ -1,5 +1,6 @@
 /* What the service counts: for /metrics (Prometheus text) and /v1/stats (rolling, JSON). */
 #pragma once
+#include "protocol/json_writer.h"
 #include "protocol/result.h"
 #include "protocol/technique_info.h"
 
@@ -26,5 +27,7 @@ void metrics_print_one(
     struct metrics_text *text, const char *name, const char *type, const char *help, double value);
 /* Everything that metrics.c itself counts. */
 void metrics_write(struct metrics *metrics, struct metrics_text *text);
+/* "recent": of the renders of the last `ms` (512 at most) how many, and the spread of their times. */
+void metrics_write_recent(struct metrics *metrics, uint64_t ms, struct pen_json *json);
 /* Rolling per-method and per-stage timings of the last renders; malloc'd JSON. */
 char *metrics_stats_json(struct metrics *metrics);

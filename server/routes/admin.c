@@ -1,4 +1,5 @@
 /* The admin listener: /livez, /readyz and /metrics. Busy is not ready, but never not live. */
+#include "protocol/json_writer.h"
 #include "protocol/memory.h"
 #include "server/base/clock.h"
 #include "server/base/log.h"
@@ -7,7 +8,9 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 
+#define RECENT_MS 10000 /* that live figures look back on */
 #define CANARY_DEADLINE_MS 5000
 #define CANARY_SIDE 32
 
@@ -99,7 +102,14 @@ static void readyz(struct http_exchange *x, struct service *s)
 
 /* ---- numbers ---- */
 
-static void write_service(struct service *s, struct metrics_text *text)
+/* One of the service's numbers. */
+struct figure {
+    const char *name, *type, *help;
+    double value;
+};
+#define MOST_FIGURES 80
+
+static uint32_t read_figures(struct service *s, struct figure figures[MOST_FIGURES])
 {
     struct worker_pool_numbers pool;
     struct scheduler_numbers queue;
@@ -113,23 +123,7 @@ static void write_service(struct service *s, struct metrics_text *text)
     importer_read(s->importer, &imports);
     result_cache_read(s->cache, &cache);
     door_read(http_listener_door(s->listener), &door);
-    if (pool.has_device) {
-        char renderer[sizeof pool.device.renderer];
-        char *to = renderer;
-        for (const char *c = pool.device.renderer; *c; c++)
-            *to++ = *c == '"' || *c == '\\' || *c == '\n' ? '_' : *c;
-        *to = 0;
-        metrics_print(text,
-            "# HELP penumbra_device_info What renders.\n"
-            "# TYPE penumbra_device_info gauge\n"
-            "penumbra_device_info{renderer=\"%s\",platform=\"%s\",software=\"%u\","
-            "version=\"" PENUMBRA_VERSION "\"} 1\n",
-            renderer, pool.device.platform, pool.device.software != 0);
-    }
-    const struct {
-        const char *name, *type, *help;
-        double value;
-    } rows[] = {
+    const struct figure rows[] = {
         {"penumbra_uptime_seconds", "gauge", "Since the start.",
             clock_ms(clock_now_ns() - s->started_ns) / 1e3},
         {"penumbra_ready", "gauge", "1: takes renders.", obstacle_of(s) == NULL},
@@ -232,8 +226,58 @@ static void write_service(struct service *s, struct metrics_text *text)
         {"penumbra_sent_bytes_total", "counter", "Answer bodies.",
             (double)__atomic_load_n(&s->bytes_sent, __ATOMIC_RELAXED)},
     };
-    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++)
-        metrics_print_one(text, rows[i].name, rows[i].type, rows[i].help, rows[i].value);
+    _Static_assert(sizeof rows / sizeof *rows <= MOST_FIGURES, "raise MOST_FIGURES");
+    memcpy(figures, rows, sizeof rows);
+    return sizeof rows / sizeof *rows;
+}
+
+static void write_device(struct service *s, struct metrics_text *text)
+{
+    struct worker_pool_numbers pool;
+    worker_pool_read(s->pool, &pool);
+    if (pool.has_device) {
+        char renderer[sizeof pool.device.renderer];
+        char *to = renderer;
+        for (const char *c = pool.device.renderer; *c; c++)
+            *to++ = *c == '"' || *c == '\\' || *c == '\n' ? '_' : *c;
+        *to = 0;
+        metrics_print(text,
+            "# HELP penumbra_device_info What renders.\n"
+            "# TYPE penumbra_device_info gauge\n"
+            "penumbra_device_info{renderer=\"%s\",platform=\"%s\",software=\"%u\","
+            "version=\"" PENUMBRA_VERSION "\"} 1\n",
+            renderer, pool.device.platform, pool.device.software != 0);
+    }
+}
+
+static void write_service(struct service *s, struct metrics_text *text)
+{
+    struct figure figures[MOST_FIGURES];
+    uint32_t count = read_figures(s, figures);
+    write_device(s, text);
+    for (uint32_t i = 0; i < count; i++)
+        metrics_print_one(
+            text, figures[i].name, figures[i].type, figures[i].help, figures[i].value);
+}
+
+/* The same numbers for pages that show how the service is. */
+char *routes_live_json(void *service)
+{
+    struct service *s = service;
+    struct figure figures[MOST_FIGURES];
+    struct pen_json json = {0};
+    struct timespec now;
+    uint32_t count = read_figures(s, figures);
+    clock_gettime(CLOCK_REALTIME, &now);
+    pen_json_object(&json, NULL);
+    pen_json_double(&json, "unix_s", (double)now.tv_sec + 1e-3 * (double)(now.tv_nsec / 1000000));
+    metrics_write_recent(s->metrics, RECENT_MS, &json);
+    pen_json_object(&json, "metrics");
+    for (uint32_t i = 0; i < count; i++)
+        pen_json_double(&json, figures[i].name, figures[i].value);
+    pen_json_end(&json);
+    pen_json_end(&json);
+    return pen_json_finish(&json, NULL);
 }
 
 static void metrics_page(struct http_exchange *x, struct service *s)

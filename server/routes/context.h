@@ -7,6 +7,7 @@
 #include "server/access/auth.h"
 #include "server/http/http.h"
 #include "server/jobs/jobs.h"
+#include "server/live/feed.h"
 #include "server/queue/scheduler.h"
 #include "server/uploads/importer.h"
 #include "server/store/scrubber.h"
@@ -28,6 +29,7 @@ struct service {
     struct metrics *metrics;
     struct auto_runs *auto_runs;
     struct jobs *jobs;
+    struct feed *feed; /* of what the service counts */
     struct auth *auth; /* NULL: no token is asked for */
     struct http_listener *listener, *admin;
     char *openapi, openapi_tag[PEN_ID_HEX + 1];

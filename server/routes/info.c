@@ -62,6 +62,13 @@ bool route_stats(struct call *call, struct pen_error *error)
     return call_json(call, 200, metrics_stats_json(call->service->metrics));
 }
 
+bool route_live(struct call *call, struct pen_error *error)
+{
+    (void)error;
+    feed_answer(call->service->feed, call->exchange);
+    return true;
+}
+
 static void write_limits(struct pen_json *json, const struct config *config)
 {
     pen_json_object(json, "limits");
@@ -125,6 +132,7 @@ bool route_service(struct call *call, struct pen_error *error)
     pen_json_string(&json, "images", "/v1/images");
     pen_json_string(&json, "jobs", "/v1/jobs");
     pen_json_string(&json, "stats", "/v1/stats");
+    pen_json_string(&json, "events", "/v1/events");
     pen_json_end(&json);
     pen_json_end(&json);
     http_add_header(call->exchange, "Cache-Control", "no-store");

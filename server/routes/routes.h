@@ -11,6 +11,8 @@ extern const struct http_callbacks routes_callbacks, routes_admin_callbacks;
 #include "protocol/endpoints.def"
 #undef ENDPOINT
 
+/* What each event of /v1/events says; malloc'd. */
+char *routes_live_json(void *service);
 /* Everything that a request refers to must be in the store. */
 bool routes_check_store(
     struct call *call, const struct pen_request *request, struct pen_error *error);

@@ -223,6 +223,42 @@ static bool check_rows(struct pen_param_table table, const void *object, uint32_
     return true;
 }
 
+static bool rows_are_legible(struct pen_param_table table, const void *object)
+{
+    for (uint32_t r = 0; r < table.count; r++) {
+        const struct pen_param *row = &table.rows[r];
+        if (row->type == PEN_PARAM_TEXT && !memchr(pen_param_load_text(row, object), 0, row->bytes))
+            return false;
+        uint32_t choices = 0;
+        while (row->choices && row->choices[choices])
+            choices++;
+        if (row->choices && !(pen_param_load(row, object, 0) < choices))
+            return false;
+    }
+    return true;
+}
+
+bool pen_request_is_legible(
+    const struct pen_request *request, const struct pen_catalogue *catalogue)
+{
+    if (!memchr(request->technique, 0, sizeof request->technique) ||
+        request->camera.mode > PEN_CAMERA_ORBIT || request->light_count > PEN_MAX_LIGHTS)
+        return false;
+    const struct pen_technique_info *info = pen_catalogue_find(catalogue, request->technique);
+    bool ok = info && rows_are_legible(info->params, request->technique_params) &&
+              rows_are_legible(pen_request_table(), request) &&
+              rows_are_legible(pen_camera_table(), &request->camera) &&
+              rows_are_legible(pen_output_table(), &request->output) &&
+              rows_are_legible(pen_delivery_table(), &request->delivery);
+    for (uint32_t i = 0; ok && i < request->light_count; i++) {
+        const struct pen_light *light = &request->lights[i];
+        ok = light->type < PEN_LIGHT_TYPES && light->texture <= PEN_TEXTURE_PATTERN &&
+             light->pattern < sizeof pen_pattern_names / sizeof *pen_pattern_names - 1 &&
+             rows_are_legible(pen_light_table(), light);
+    }
+    return ok;
+}
+
 bool pen_request_check(const struct pen_request *request, const struct pen_catalogue *catalogue,
     struct pen_error *error)
 {

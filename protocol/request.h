@@ -140,6 +140,10 @@ bool pen_delivery_is_limited(const struct pen_delivery *delivery);
  * degenerate camera, known technique. Errors: PEN_INVALID with a pointer. A worker calls it
  * too: it trusts no message. */
 struct pen_technique_info;
+/* Whether it can be printed safely: its texts end and its enumerations are theirs, whatever its
+ * numbers say. */
+bool pen_request_is_legible(
+    const struct pen_request *request, const struct pen_catalogue *catalogue);
 bool pen_request_check(const struct pen_request *request, const struct pen_catalogue *catalogue,
     struct pen_error *error);
 

@@ -92,5 +92,10 @@ struct pen_result {
     struct pen_program_counts programs;
     struct pen_comparison comparison; /* all 0 unless a reference was given */
 };
+/* Ends the texts of what another process reported. */
+void pen_device_receive(struct pen_device_info *device);
+/* Of one that another process reported: whether it can be read and printed safely, whatever its
+ * numbers say. Its error is made safe (pen_error_receive). */
+bool pen_result_receive(struct pen_result *result, const struct pen_catalogue *catalogue);
 void pen_result_warn(struct pen_result *result, const char *format, ...)
     __attribute__((format(printf, 2, 3)));

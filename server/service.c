@@ -194,6 +194,7 @@ static bool start_pool(struct service *s, struct pen_error *error)
 {
     const struct config *c = s->config;
     struct worker_pool_config config = {.workers = (uint32_t)c->workers,
+        .catalogue = s->catalogue,
         .warm_up = c->warm_up.on,
         .hang_timeout_ms = c->hang_timeout_ms,
         .silence_timeout_ms = c->silence_timeout_ms,

@@ -7,6 +7,7 @@
 struct worker_pool_config {
     char worker_path[4096];
     struct pen_renderer_config renderer;
+    const struct pen_catalogue *catalogue;
     bool warm_up;
     uint32_t workers;
     uint64_t hang_timeout_ms, silence_timeout_ms, quarantine_s;

@@ -39,9 +39,8 @@ static void on_hello(struct slot *slot, const struct channel_hello *hello)
     numbers->has_device = true;
     numbers->warmed = numbers->warmed || !pool->config.warm_up;
     numbers->device = hello->device;
-    numbers->device.renderer[sizeof numbers->device.renderer - 1] = 0;
-    numbers->device.version[sizeof numbers->device.version - 1] = 0;
-    numbers->device.platform[sizeof numbers->device.platform - 1] = 0;
+    pen_device_receive(&numbers->device);
+    struct pen_device_info device = numbers->device;
     numbers->create_ms = hello->create_ms;
     numbers->up++;
     numbers->pids[slot->index] = (int)slot->process.pid;
@@ -49,8 +48,8 @@ static void on_hello(struct slot *slot, const struct channel_hello *hello)
         numbers->back_ms = back_ms;
     pthread_mutex_unlock(&pool->lock);
     log_event(LOG_INFO, "worker %u (pid %d) renders on %s (%s%s), context in %.0f ms%s%.0f%s",
-        slot->index, (int)slot->process.pid, hello->device.renderer, hello->device.platform,
-        hello->device.software ? ", software" : "", hello->create_ms,
+        slot->index, (int)slot->process.pid, device.renderer, device.platform,
+        device.software ? ", software" : "", hello->create_ms,
         slot->died_ns ? ", back after " : ", up after ",
         slot->died_ns ? back_ms : clock_ms(clock_now_ns() - slot->spawned_ns), " ms");
 }
@@ -101,7 +100,6 @@ static void on_done(
     if (!flight)
         return;
     struct pen_result result = message->result;
-    pen_error_receive(&result.error);
     struct outcome outcome = {.error = result.error};
     result.stage_ms[PEN_STAGE_QUEUE] =
         (float)clock_ms(flight->render->taken_ns - flight->render->queued_ns);
@@ -255,7 +253,7 @@ static void on_part(
 
 /* False when the worker is to be buried. */
 static bool on_message(
-    struct slot *slot, const struct channel_message *message, const struct channel_fds *fds)
+    struct slot *slot, struct channel_message *message, const struct channel_fds *fds)
 {
     struct flight *flight = worker_slot_find(slot, message->job);
     slot->alive_ns = clock_now_ns();
@@ -302,10 +300,13 @@ static bool on_message(
         pthread_mutex_unlock(&slot->pool->lock);
         return true;
     case CHANNEL_PART:
-        on_part(slot, message, fds);
-        return true;
     case CHANNEL_DONE:
-        on_done(slot, message, fds);
+        if (!pen_result_receive(&message->result, slot->pool->config.catalogue))
+            return false;
+        if (message->kind == CHANNEL_PART)
+            on_part(slot, message, fds);
+        else
+            on_done(slot, message, fds);
         return true;
     default:
         return false;

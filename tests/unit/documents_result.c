@@ -280,8 +280,45 @@ static void test_descriptions(void)
     cJSON_Delete(root);
 }
 
+/* What another process reports is refused, or can be printed. */
+static void test_receive(void)
+{
+    static struct pen_result sound, r;
+    pen_request_default(&sound.completed, &fake_catalogue);
+    CHECK(pen_result_receive(&sound, &fake_catalogue));
+    r = sound;
+    memset(&r.device, 'x', sizeof r.device);
+    memset(&r.error, 'x', sizeof r.error);
+    memset(r.warnings, 'x', sizeof r.warnings);
+    memset(r.passes[0].name, 'x', sizeof r.passes[0].name);
+    r.pass_count = 1;
+    r.warning_count = PEN_MAX_WARNINGS;
+    CHECK(pen_result_receive(&r, &fake_catalogue));
+    CHECK(strlen(r.device.renderer) == sizeof r.device.renderer - 1);
+    CHECK(strlen(r.warnings[PEN_MAX_WARNINGS - 1]) == sizeof r.warnings[0] - 1);
+    CHECK(strlen(r.passes[0].name) == sizeof r.passes[0].name - 1);
+    CHECK(r.error.code == PEN_INTERNAL && strlen(r.error.message) < sizeof r.error.message);
+    free(pen_result_json(&r, NULL, &fake_catalogue));
+#define REFUSED(change)                                                                            \
+    do {                                                                                           \
+        r = sound;                                                                                 \
+        change;                                                                                    \
+        CHECK(!pen_result_receive(&r, &fake_catalogue));                                           \
+    } while (0)
+    REFUSED(r.warning_count = PEN_MAX_WARNINGS + 1);
+    REFUSED(r.pass_count = PEN_MAX_PASSES + 1);
+    REFUSED((r.pass_count = 1, r.passes[0].stage = PEN_STAGES));
+    REFUSED(r.completed.light_count = PEN_MAX_LIGHTS + 1);
+    REFUSED((r.completed.light_count = 1, r.completed.lights[0].type = PEN_LIGHT_TYPES));
+    REFUSED(r.completed.output.format = PEN_FORMATS);
+    REFUSED(r.completed.camera.mode = 99);
+    REFUSED(memset(r.completed.technique, 'x', sizeof r.completed.technique));
+    REFUSED(memset(r.completed.delivery.session, 'x', sizeof r.completed.delivery.session));
+}
+
 int main(void)
 {
+    test_receive();
     test_numbers();
     test_round_trip();
     test_record();

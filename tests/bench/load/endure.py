@@ -245,7 +245,7 @@ class Endurance:
 
     def soak(self):
         print("soak")
-        daemon, _ = self.daemon("--gpu-memory=512M", "--store-limit=200M")
+        daemon, _ = self.daemon("--gpu-memory=512M", "--store-limit=200M", "--result-cache=4M")
         dice, scenes, counts, worker = random.Random(self.options.seed), [], {}, daemon.worker()
         techniques = [t for t in daemon.get("/v1/techniques").json()["techniques"]
                       if t["name"] != "auto"]

@@ -1,8 +1,10 @@
 /* penumbra-import: one upload, one process. See import_process.h. */
 #include "protocol/request.h"
+#include "protocol/memory.h"
 #include "renderer/import/import.h"
 #include "renderer/import/import_process.h"
 #include "renderer/import/sandbox.h"
+#include <cjson/cJSON.h>
 #include <errno.h>
 #include <getopt.h>
 #include <signal.h>
@@ -140,6 +142,12 @@ static bool run(const struct options *options, struct pen_error *error)
            fits(options, blob_bytes, error) && write_output(blob, blob_bytes, error);
 }
 
+/* Memory that runs out is told as such, not as text that cannot be parsed. */
+static void *allocate(size_t bytes)
+{
+    return pen_alloc(bytes, 1);
+}
+
 int main(int argc, char **argv)
 {
     struct options options = {.memory_mb = 2048, .cpu_seconds = 60, .output_bytes = OUTPUT_BYTES};
@@ -150,6 +158,7 @@ int main(int argc, char **argv)
         return 2;
     }
     prepare_handlers(&options);
+    cJSON_InitHooks(&(cJSON_Hooks){allocate, free});
     struct pen_error error = {0};
     run(&options, &error);
     report(&error);

@@ -498,6 +498,18 @@ static void auto_light(struct pen_light *light, const struct scene *scene, const
     light->power_w = GLM_PIf * GLM_PIf * distance * distance;
 }
 
+bool lights_shine(const struct scene *scene)
+{
+    for (uint32_t i = 0; i < scene->stage->moment_count; i++)
+        for (uint32_t k = 0; k < scene->stage->moments[i].light_count; k++) {
+            struct light light;
+            light_emission(&light, &scene->stage->moments[i].lights[k], scene);
+            if (light.radiance[0] + light.radiance[1] + light.radiance[2] > 0)
+                return true;
+        }
+    return false;
+}
+
 uint32_t lights_resolve(struct light lights[PEN_MAX_LIGHTS], struct pen_request *request,
     const struct scene *scene, const struct view *view, struct pen_result *result)
 {
@@ -507,6 +519,10 @@ uint32_t lights_resolve(struct light lights[PEN_MAX_LIGHTS], struct pen_request 
             pen_result_warn(
                 result, "The scene has %u lights; the first %d are used.", n, PEN_MAX_LIGHTS);
             n = PEN_MAX_LIGHTS;
+        }
+        if (n && !lights_shine(scene)) {
+            pen_result_warn(result, "The scene's lights give no light; a key light does.");
+            n = 0;
         }
         for (uint32_t i = 0; i < n; i++)
             request->lights[i] = scene->blob.lights[i].light;

@@ -23,6 +23,9 @@ struct light {
 uint32_t lights_resolve(struct light lights[PEN_MAX_LIGHTS], struct pen_request *request,
     const struct scene *scene, const struct view *view, struct pen_result *result);
 
+/* The scene has lights of its own, and one of them gives light at some moment of its stage. */
+bool lights_shine(const struct scene *scene);
+
 /* Only `source`, `radiance`, `origin` and, where it has a direction, `z`. */
 void light_emission(struct light *light, const struct pen_light *source, const struct scene *scene);
 

@@ -190,12 +190,12 @@ static float fill_of(float lit)
 void light_choose_exposure(struct pen_request *r, const struct light *lights, uint32_t count,
     bool scenes_own, const struct scene *scene)
 {
-    bool key_light = scenes_own && !scene->blob.light_count;
+    bool key_light = scenes_own && !lights_shine(scene);
     struct reading found =
         key_light ? (struct reading){1, 1} : meter(lights, count, scenes_own, scene);
     float level = found.level, shown = fmaxf(level, GLOW * glow_level(scene));
     if (r->exposure_ev == PEN_AUTO)
-        r->exposure_ev = glm_clamp(log2f(0.72f / shown), -24, 24);
+        r->exposure_ev = glm_clamp(log2f(0.72f / shown), -32, 32);
     if (r->sky_level == PEN_AUTO)
         r->sky_level = fminf(key_light ? level : fill_of(found.lit) * level, 1e6f);
 }

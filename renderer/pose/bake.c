@@ -71,8 +71,11 @@ bool pose_bake(void *data, size_t *bytes, struct pen_error *error)
             file->triangles = posed->header->triangles;
             finish_extent(file, pose);
             memcpy(file->origin, posed->header->origin, sizeof file->origin);
-        } else if (error && !strcmp(error->pointer, "/time_s"))
-            pen_fail(error, PEN_INVALID, "", "At rest, skins move something beyond 1e12 m.");
+        } else if (error && !strcmp(error->pointer, "/time_s")) {
+            *error = (struct pen_error){0};
+            pen_fail(error, PEN_INVALID, "",
+                "At rest, skins or morph targets move something beyond 1e12 m.");
+        }
         pose_destroy(pose);
         if (!done)
             return false;

@@ -5,7 +5,7 @@ import unittest
 
 import harness
 from harness import Daemon
-from pictures import box, mesh_scene, pose_files, rgb
+from pictures import box, mesh_scene, off_by_more_than, pose_files, rgb
 
 SIZE = {"width": 160, "height": 120}
 RED = (1, 0.05, 0.05, 1)
@@ -114,6 +114,39 @@ class Subjects(unittest.TestCase):
         answers = [self.d.render(self.d.upload(scene(*parts)), SIZE, Accept="application/json").json()
                    for parts in ((wall,), (wall, lamp))]
         self.assertEqual(*[a["request"]["exposure_ev"] for a in answers])
+
+    def test_own_lights_that_hardly_shine(self):
+        """None at all: as without any. Very little: exposure is for it."""
+        def lit(intensity, place):
+            return mesh_scene(*ball(), color=(0.5, 0.5, 0.5, 1), nodes=[
+                {"translation": place, "extensions": {"KHR_lights_punctual": {"light": 0}}}],
+                extensionsUsed=["KHR_lights_punctual"], extensions={"KHR_lights_punctual": {
+                    "lights": [{"type": "point", "intensity": intensity}]}})
+        plain = self.picture(mesh_scene(*ball(), color=(0.5, 0.5, 0.5, 1)))
+        self.assertEqual(off_by_more_than(plain, self.picture(lit(0, [0, 3, 0])), 0), 0)
+        seen = self.picture(lit(5, [400, 300, 600]), ground=False, background=[0, 0, 1])
+        middle = [sum(p) / 3 for p in seen if p[2] < 250 and p != (0, 0, 255)]
+        self.assertTrue(80 < sum(middle) / len(middle) < 200, sum(middle) / len(middle))
+
+    def test_a_highlight_is_one(self):
+        """Of the key light in something black and smooth: no grid of the points it is sampled at."""
+        file = mesh_scene(*ball(), color=(0, 0, 0, 1), material={"pbrMetallicRoughness": {
+            "baseColorFactor": [0, 0, 0, 1], "metallicFactor": 0, "roughnessFactor": 0.02}})
+        width, height = 600, 450
+        seen = [sum(p) / 3 for p in self.picture(
+            file, ground=False, sky=False, exposure_ev=-6, width=width, height=height)]
+        limit = 0.85 * max(seen)
+        bright = {i for i, value in enumerate(seen) if value > limit}
+        groups = 0
+        while bright:
+            groups += 1
+            todo = [bright.pop()]
+            while todo:
+                at = todo.pop()
+                near = {at + dx + dy * width for dx in (-1, 0, 1) for dy in (-1, 0, 1)} & bright
+                bright -= near
+                todo += near
+        self.assertEqual(groups, 1)
 
     def test_metals_mirror_a_studio(self):
         """Flat faces show a gradient, round ones light and dark; neither is black."""

@@ -69,8 +69,10 @@ vec3 specular_area(Reflectance m, ShadeLight s, vec3 p, vec3 n, vec3 v)
     vec2 size2 = vec2(dot(half_x, half_x), dot(half_y, half_y));
     float cell =
         (type == PEN_LIGHT_RECT ? 4.0 : 3.14159265) * sqrt(size2.x * size2.y) / float(k * k);
-    // The lobe is widened by the solid angle that one cell stands for.
-    float to2 = dot(to, to), a = m.alpha + min(0.25 * sqrt(cell / to2), 0.5);
+    // The lobe is widened by the solid angle that one cell stands for; a narrow one by more, or it
+    // would show the cells.
+    float to2 = dot(to, to), widening = mix(0.4, 0.25, min(10.0 * m.alpha, 1.0));
+    float a = m.alpha + min(widening * sqrt(cell / to2), 0.5);
     float nv = max(dot(n, v), 1e-3), facing = max(-dot(axis, to), 0.0);
     vec3 n_of = vec3(dot(n, half_x), dot(n, half_y), dot(n, to));
     vec3 v_of = vec3(dot(v, half_x), dot(v, half_y), dot(v, to));

@@ -42,7 +42,8 @@ def ball(radius=1, inwards=False, steps=24):
 def scene(*parts):
     """parts: (mesh, colour, further members of the material)."""
     b = pose_files.Builder()
-    b.json["extensionsUsed"] = ["KHR_materials_unlit", "KHR_materials_emissive_strength"]
+    b.json["extensionsUsed"] = ["KHR_materials_unlit", "KHR_materials_emissive_strength",
+                                "KHR_materials_transmission"]
     b.json["materials"] = []
     for (points, normals, indices), color, material in parts:
         b.json["materials"].append({"pbrMetallicRoughness": {
@@ -127,6 +128,17 @@ class Subjects(unittest.TestCase):
         seen = self.picture(lit(5, [400, 300, 600]), ground=False, background=[0, 0, 1])
         middle = [sum(p) / 3 for p in seen if p[2] < 250 and p != (0, 0, 255)]
         self.assertTrue(80 < sum(middle) / len(middle) < 200, sum(middle) / len(middle))
+
+    def test_glass_is_seen_through(self):
+        """KHR_materials_transmission without a texture; metal lets nothing through."""
+        for metallic, through in ((0, True), (1, False)):
+            glass = {"pbrMetallicRoughness": {"metallicFactor": metallic, "roughnessFactor": 0.1},
+                     "extensions": {"KHR_materials_transmission": {"transmissionFactor": 1}}}
+            wall = (box((6, 6, 0.2), (0, 0, -3)), RED, {})
+            seen = self.picture(scene((ball(), (1, 1, 1, 1), glass), wall), ground=False,
+                                camera={"eye": [0, 0, 6], "target": [0, 0, 0], "fov_y_deg": 30})
+            middle = seen[SIZE["height"] // 2 * SIZE["width"] + SIZE["width"] // 2]
+            self.assertEqual(middle[0] > 1.3 * middle[1], through, middle)
 
     def test_a_highlight_is_one(self):
         """Of the key light in something black and smooth: no grid of the points it is sampled at."""

@@ -42,6 +42,19 @@ static float clamp01(float x)
     return x > 0 ? fminf(x, 1) : 0;
 }
 
+#define FILM 0.15f /* what clear glass covers of what is behind it, with what it reflects */
+
+/* Light that passes through is drawn as surfaces that cover little. An opaque material's textures may
+ * have any alpha, and then it stays so. */
+static void let_through(struct psc_material *to, const struct gltf_material *from)
+{
+    float through = clamp01(from->transmission) * (1 - clamp01(from->metallic));
+    if (through <= 0 || to->alpha_mode != PSC_OPAQUE || to->base.texture >= 0)
+        return;
+    to->alpha_mode = PSC_BLEND;
+    to->base_color[3] = 1 - (1 - FILM) * through;
+}
+
 static struct psc_material convert(struct imp_context *context, const struct gltf_material *from)
 {
     struct psc_material to = psc_material_default();
@@ -68,6 +81,7 @@ static struct psc_material convert(struct imp_context *context, const struct glt
     to.normal = texture_ref(context, &from->normal, IMP_NORMAL);
     to.occlusion = texture_ref(context, &from->occlusion, IMP_OCCLUSION);
     to.emission = texture_ref(context, &from->emission, IMP_EMISSION);
+    let_through(&to, from);
     const struct psc_material_rest rest = imp_material_rest(from);
     pose_finish_material(&to, &rest);
     return to;

@@ -43,7 +43,9 @@ static const struct {
     {"KHR_materials_pbrSpecularGlossiness", ""},
     {"KHR_materials_sheen", "is drawn without its sheen"},
     {"KHR_materials_specular", ""},
-    {"KHR_materials_transmission", "is drawn opaque: nothing shines through"},
+    {"KHR_materials_transmission",
+        "is drawn as a film: what is seen through it is neither bent nor "
+        "coloured, and where a texture says where, it is opaque"},
     {"KHR_materials_unlit", ""},
     {"KHR_materials_variants", ""},
     {"KHR_materials_volume", "is drawn without depth: nothing is absorbed or bent inside"},

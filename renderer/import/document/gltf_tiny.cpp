@@ -257,6 +257,9 @@ void dielectric(const tinygltf::Material &from, gltf_material &to)
     to.specular_strength = to.specular[0] = to.specular[1] = to.specular[2] = 1;
     if (const tinygltf::Value *index = find(from.extensions, "KHR_materials_ior"))
         to.ior = static_cast<float>(number(*index, "ior", 1.5));
+    if (const tinygltf::Value *transmission = find(from.extensions, "KHR_materials_transmission"))
+        if (!transmission->Has("transmissionTexture"))
+            to.transmission = static_cast<float>(number(*transmission, "transmissionFactor", 0));
     if (const tinygltf::Value *specular = find(from.extensions, "KHR_materials_specular")) {
         to.specular_strength = static_cast<float>(number(*specular, "specularFactor", 1));
         numbers(*specular, "specularColorFactor", to.specular, 3);

@@ -69,6 +69,7 @@ struct gltf_material {
     float base_color[4], emissive[3], emissive_strength, metallic, roughness;
     float specular[3], glossiness; /* F0; else KHR_materials_specular's colour */
     float specular_strength, ior;
+    float transmission; /* of all of it: 0 where a texture says where */
     float normal_scale, occlusion_strength, alpha_cutoff;
     const char *alpha_mode; /* a literal: "OPAQUE", "MASK", "BLEND" or "" */
     bool double_sided, unlit, specular_glossiness;

@@ -138,9 +138,11 @@ SCHEMA(specular_glossiness,
 SCHEMA(emissive_strength, {"emissiveStrength", NUMBER});
 SCHEMA(unlit, {"name", STRING}); /* empty; but C has no empty arrays */
 SCHEMA(ior, {"ior", NUMBER});
+SCHEMA(transmission, {"transmissionFactor", NUMBER}, OBJ("transmissionTexture", texture_info));
 SCHEMA(specular, {"specularFactor", NUMBER}, {"specularColorFactor", NUMBERS, .max = 3});
 SCHEMA(material_extensions,
     OBJ("KHR_materials_ior", ior),
+    OBJ("KHR_materials_transmission", transmission),
     OBJ("KHR_materials_specular", specular),
     OBJ("KHR_materials_unlit", unlit),
     OBJ("KHR_materials_pbrSpecularGlossiness", specular_glossiness),

@@ -3,9 +3,10 @@
 #   tests/run.sh [--quick] [ctest options]
 # Everything runs under ctest in the dev build. Without --quick clang-tidy and cppcheck then read the
 # sources (.clang-tidy, tests/lint/cppcheck.txt), clang compiles them too, the unit tests and the API
-# smoke test run under the address and undefined-behaviour sanitizers, and the server's unit tests
-# under the thread sanitizer, as long as PENUMBRA_TEST_BUDGET_S (1400) seconds are not used up. What
-# did not run is listed at the end, with the reason.
+# smoke test run under the address and undefined-behaviour sanitizers, the server's unit tests under
+# the thread sanitizer, and every fuzzer for PENUMBRA_FUZZ_S (10) seconds, as long as
+# PENUMBRA_TEST_BUDGET_S (1400) seconds are not used up. What did not run is listed at the end, with
+# the reason.
 # Exit status: 0 when every stage that ran passed, and none was cut short.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -129,5 +130,12 @@ if later build-tsan ctest-tsan; then
     stage build-tsan "$(left)" bash -c 'build tsan threaded' &&
         stage ctest-tsan "$(left)" bash -c 'run_ctest tsan ctest-tsan "$@"' - "${tsan[@]}" || true
     tests_not_run tsan ctest-tsan "${tsan[@]}"
+fi
+if ! command -v clang >/dev/null; then
+    not_run+="  fuzz: clang is not installed"$'\n'
+elif later build-fuzz fuzz; then
+    stage build-fuzz "$(left)" bash -c 'build fuzz fuzzers' &&
+        stage fuzz "$(left)" python3 -B tests/fuzz/run.py build/fuzz --jobs "$jobs" \
+            --seconds "${PENUMBRA_FUZZ_S:-10}" || true
 fi
 finish

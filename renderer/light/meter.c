@@ -59,14 +59,16 @@ static int ascending(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* What half of the surface shines more than: a lamp in a scene counts for nothing. */
-static float glow_level(const struct scene *scene)
+/* What half of the surface shines more than, with what it reflects of lights of that level; 0 where
+ * half of it does not shine: a lamp in a scene counts for nothing. */
+static float glow_level(const struct scene *scene, float level)
 {
     float found[OUTLINE_SAMPLES], most = 0;
     for (uint32_t i = 0; i < scene->stage->moment_count; i++) {
         const struct outline_samples *samples = &scene->stage->moments[i].samples;
         for (uint32_t k = 0; k < samples->count; k++)
-            found[k] = samples->at[k].glow;
+            found[k] =
+                samples->at[k].glow > 0 ? samples->at[k].glow + samples->at[k].albedo * level : 0;
         qsort(found, samples->count, sizeof *found, ascending);
         most = samples->count ? fmaxf(most, found[(samples->count - 1) / 2]) : most;
     }
@@ -193,7 +195,7 @@ void light_choose_exposure(struct pen_request *r, const struct light *lights, ui
     bool key_light = scenes_own && !lights_shine(scene);
     struct reading found =
         key_light ? (struct reading){1, 1} : meter(lights, count, scenes_own, scene);
-    float level = found.level, shown = fmaxf(level, GLOW * glow_level(scene));
+    float level = found.level, shown = fmaxf(level, GLOW * glow_level(scene, level));
     if (r->exposure_ev == PEN_AUTO)
         r->exposure_ev = glm_clamp(log2f(0.72f / shown), -32, 32);
     if (r->sky_level == PEN_AUTO)

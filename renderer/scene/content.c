@@ -10,7 +10,7 @@
 #define MOST_SETTINGS 4
 #define SETTING_SIZE 8 /* of the rest, at least */
 #define SLAB_HEIGHT 50 /* times less high than wide */
-#define SPECKS 50      /* all extents together make so little of the whole */
+#define SPECKS 20      /* all extents together make so little of the whole */
 #define LOOKED_AT 512u /* triangles of a shell */
 
 struct finding {

@@ -96,18 +96,19 @@ static float area_normal(const struct psc_scene *s, const struct psc_instance *i
     return 0.5f * twice;
 }
 
-static float glow_of(const struct psc_scene *s, const struct psc_material *m)
+/* Of a colour under a texture of which the last level is the mean, as near as 8 bits have it. */
+static float brightest(
+    const struct psc_scene *s, const float color[3], const struct psc_texture_ref *map)
 {
-    float mean[3] = {1, 1, 1};
-    if (m->emission.texture >= 0) { /* the last level is the mean, as near as 8 bits have it */
-        const struct psc_image *image = &s->images[s->textures[m->emission.texture].image];
-        const uint8_t *texel =
-            s->texels + image->first_byte + mip_chain_bytes(image->width, image->height) - 4;
-        for (int k = 0; k < 3; k++)
-            mean[k] = pen_srgb_decodef(texel[k] / 255.0f);
+    float most = 0;
+    const uint8_t *texel = NULL;
+    if (map->texture >= 0) {
+        const struct psc_image *image = &s->images[s->textures[map->texture].image];
+        texel = s->texels + image->first_byte + mip_chain_bytes(image->width, image->height) - 4;
     }
-    return fmaxf(
-        m->emissive[0] * mean[0], fmaxf(m->emissive[1] * mean[1], m->emissive[2] * mean[2]));
+    for (int k = 0; k < 3; k++)
+        most = fmaxf(most, color[k] * (texel ? pen_srgb_decodef(texel[k] / 255.0f) : 1));
+    return most;
 }
 
 /* Walks over (some of) the triangles inside. With `samples`, takes one whenever another `stride` of
@@ -120,7 +121,9 @@ static double walk(struct outline_samples *o, const struct psc_scene *s, const f
     for (uint32_t n = 0; n < s->instance_count; n++) {
         const struct psc_primitive *p = &s->primitives[s->instances[n].primitive];
         uint64_t triangles = p->index_count / 3;
-        float glow = take ? glow_of(s, &s->materials[p->material]) : 0;
+        const struct psc_material *m = &s->materials[p->material];
+        float glow = take ? brightest(s, m->emissive, &m->emission) : 0;
+        float albedo = take ? brightest(s, m->base_color, &m->base) : 0;
         for (uint64_t i = (step - at % step) % step; i < triangles; i += step) {
             float center[3], normal[3];
             float one =
@@ -132,8 +135,8 @@ static double walk(struct outline_samples *o, const struct psc_scene *s, const f
                 memcpy(o->at[o->count].point, center, sizeof center);
                 memcpy(o->at[o->count].normal, normal, sizeof normal);
                 o->at[o->count].glow = glow;
-                o->at[o->count++].one_sided =
-                    !(s->materials[p->material].flags & (uint32_t)PSC_DOUBLE_SIDED);
+                o->at[o->count].albedo = albedo;
+                o->at[o->count++].one_sided = !(m->flags & (uint32_t)PSC_DOUBLE_SIDED);
             }
         }
         at += triangles;

@@ -16,7 +16,8 @@ struct outline {
 struct outline_samples {
     struct {
         float point[3], normal[3];
-        float glow;     /* radiance of its own in the brightest channel, a texture's in the mean */
+        /* In the brightest channel, of a texture the mean: radiance of its own, base colour. */
+        float glow, albedo;
         bool one_sided; /* not seen from behind */
     } at[OUTLINE_SAMPLES];
     uint32_t count;

@@ -84,6 +84,7 @@ class Subjects(unittest.TestCase):
                 ("slab and sky", [thing, (box((100, 0.5, 100), (0, -0.25, 0)), gray, {}),
                                   (ball(80, True), (0.2, 0.3, 0.9, 1), UNLIT)]),
                 ("lost", [thing, (box((0.5, 0.5, 0.5), (4000, 0, 0)), gray, {})]),
+                ("apart", [thing, (box((1, 1, 1), (100, 0.5, 0)), RED, {})]),
                 ("front", [(card(FRONT), RED, {})]), ("back", [(card(BACK), RED, {})]),
                 ("right", [(card(FRONT, 0), RED, {})]), ("left", [(card(BACK, 0), RED, {})])):
             with self.subTest(name=name):
@@ -110,6 +111,9 @@ class Subjects(unittest.TestCase):
         self.assertAlmostEqual(linear[1] / linear[0], 0.5, delta=0.05)
         self.assertAlmostEqual(linear[2] / linear[0], 0.2, delta=0.05)
         self.assertGreater(middle[0], 180)
+        seen = self.picture(scene((ball(), (1, 1, 1, 1), {"emissiveFactor": [0.6, 0.6, 0.6]})))
+        middle = seen[SIZE["height"] // 2 * SIZE["width"] + SIZE["width"] // 2]
+        self.assertTrue(150 < middle[1] < 250, middle)
         wall = (box((2, 2, 2)), RED, {})
         lamp = (ball(0.2), (0, 0, 0, 1), glow)
         answers = [self.d.render(self.d.upload(scene(*parts)), SIZE, Accept="application/json").json()
@@ -131,8 +135,8 @@ class Subjects(unittest.TestCase):
 
     def test_glass_is_seen_through(self):
         """KHR_materials_transmission without a texture; metal lets nothing through."""
-        for metallic, through in ((0, True), (1, False)):
-            glass = {"pbrMetallicRoughness": {"metallicFactor": metallic, "roughnessFactor": 0.1},
+        for metallic, through, mode in ((0, True, "OPAQUE"), (0, True, "BLEND"), (1, False, "OPAQUE")):
+            glass = {"alphaMode": mode, "pbrMetallicRoughness": {"metallicFactor": metallic, "roughnessFactor": 0.1},
                      "extensions": {"KHR_materials_transmission": {"transmissionFactor": 1}}}
             wall = (box((6, 6, 0.2), (0, 0, -3)), RED, {})
             seen = self.picture(scene((ball(), (1, 1, 1, 1), glass), wall), ground=False,

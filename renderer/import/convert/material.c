@@ -49,10 +49,11 @@ static float clamp01(float x)
 static void let_through(struct psc_material *to, const struct gltf_material *from)
 {
     float through = clamp01(from->transmission) * (1 - clamp01(from->metallic));
-    if (through <= 0 || to->alpha_mode != PSC_OPAQUE || to->base.texture >= 0)
+    bool opaque = to->alpha_mode == PSC_OPAQUE;
+    if (through <= 0 || to->alpha_mode == PSC_MASK || (opaque && to->base.texture >= 0))
         return;
     to->alpha_mode = PSC_BLEND;
-    to->base_color[3] = 1 - (1 - FILM) * through;
+    to->base_color[3] = (opaque ? 1 : to->base_color[3]) * (1 - (1 - FILM) * through);
 }
 
 static struct psc_material convert(struct imp_context *context, const struct gltf_material *from)

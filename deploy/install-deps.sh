@@ -34,6 +34,7 @@ libegl-mesa0
 libegl1
 libgl1
 libgl1-mesa-dri
+libwebpmux3
 "
 # Compilers and headers.
 build="

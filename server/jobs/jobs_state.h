@@ -35,6 +35,7 @@ struct flight {
     struct waiter waiter;
     struct running *job;
     uint32_t frame, writes;
+    bool is_part; /* an image of a comparison that goes on: does not count as in flight */
     uint64_t due_ns;
     struct picture *picture;
     struct compare *compare;

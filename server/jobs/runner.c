@@ -3,13 +3,12 @@
 #include "protocol/memory.h"
 #include "server/base/clock.h"
 #include "server/base/log.h"
-#include "server/jobs/compared.h"
+#include "server/jobs/keep.h"
 #include "server/jobs/store/job_files.h"
 #include "server/jobs/recovery.h"
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 #define MOST_ATTEMPTS 4 /* at one frame */
 #define MOST_WRITES 6   /* of one file; the disk may have room again */
@@ -69,6 +68,22 @@ static void finish(struct waiter *waiter, const struct outcome *outcome)
 static bool is_compare_gone(void *owner)
 {
     return is_gone(&((struct flight *)owner)->waiter);
+}
+
+/* Before all requests but the first: the image of the one before is there. */
+static bool compare_goes_on(void *owner, struct compare *compare, uint32_t request)
+{
+    const struct flight *flight = owner;
+    const struct compare_row *row = &compare_rows(compare)[request - 1];
+    if (row->image) {
+        struct flight *part = pen_alloc_zero(1, sizeof *part);
+        part->job = flight->job;
+        part->frame = request - 1;
+        part->is_part = true;
+        part->picture = picture_reference(row->image);
+        land(part);
+    }
+    return true;
 }
 
 static void compare_done(void *owner, struct compare *compare, const struct pen_error *error)
@@ -138,6 +153,12 @@ static void give_to_finisher(struct jobs *j, struct running *r)
     pthread_mutex_unlock(&j->lock);
 }
 
+/* All that was asked for is there, but for the archive. */
+static bool is_complete(const struct running *r)
+{
+    return r->there == r->job.frames && (r->job.kind != JOB_COMPARE || *r->job.result.name);
+}
+
 /* Ends what can end. */
 static void end_jobs(struct jobs *j)
 {
@@ -151,8 +172,7 @@ static void end_jobs(struct jobs *j)
             unlink_running(j, r);
             continue;
         }
-        bool all = r->there == r->job.frames;
-        if (!r->has_failed && !all)
+        if (!r->has_failed && !is_complete(r))
             continue;
         if (!r->has_failed && has_archive(r) && !r->is_finished) {
             pthread_mutex_lock(&j->lock);
@@ -193,58 +213,6 @@ static void try_again(struct flight *flight)
     r->due_ns = clock_now_ns() + (BACKOFF_NS << r->attempts[frame]);
 }
 
-/* Writes a file and records it. */
-static bool keep_frame(struct jobs *j, struct running *r, uint32_t number,
-    const struct picture *picture, struct pen_error *error)
-{
-    struct job_frame frame = {.number = number};
-    int folder = job_files_open(j->root, r->job.id, error);
-    job_plan_name(r->plan, number, frame.file.name);
-    bool ok =
-        folder >= 0 && job_files_write(folder, &frame.file, picture->data, picture->size, error);
-    if (folder >= 0)
-        close(folder);
-    if (ok && !r->is_settled) {
-        job_plan_settle(&picture->result.completed, r->job.settings, sizeof r->job.settings);
-        ok = job_store_set_settings(j->store, r->job.id, r->job.settings, error);
-    }
-    ok = ok && job_store_add_frame(j->store, r->job.id, &frame, error);
-    if (!ok)
-        return false;
-    r->is_settled = true;
-    r->frames[number] = FRAME_DONE;
-    __atomic_add_fetch(&r->there, 1, __ATOMIC_RELAXED);
-    r->job.bytes += frame.file.bytes;
-    j->bytes += frame.file.bytes;
-    return true;
-}
-
-static bool keep_comparison(
-    struct jobs *j, struct running *r, struct compare *compare, struct pen_error *error)
-{
-    const struct compare_row *rows = compare_rows(compare);
-    for (uint32_t i = 0; i < r->job.frames; i++)
-        if (r->frames[i] != FRAME_DONE && rows[i].image &&
-            !keep_frame(j, r, i, rows[i].image, error))
-            return false;
-    char frames[PEN_ID_HEX + 32], id[PEN_ID_HEX + 1];
-    pen_id_to_hex(r->job.id, id);
-    snprintf(frames, sizeof frames, "/v1/jobs/%s/frames", id);
-    double total_ms = clock_ms(clock_now_ns() - r->begun_ns);
-    struct compared_extra extra = {
-        j->config.makers.catalogue, j->config.cache, NULL, frames, total_ms};
-    char *text = compared_document(job_plan_compare(r->plan), rows, &extra);
-    int folder = job_files_open(j->root, r->job.id, error);
-    snprintf(r->job.result.name, sizeof r->job.result.name, "result.json");
-    bool ok = folder >= 0 && job_files_write(folder, &r->job.result, text, strlen(text), error);
-    if (folder >= 0)
-        close(folder);
-    free(text);
-    if (ok) /* what a method could not render has no image */
-        __atomic_store_n(&r->there, r->job.frames, __ATOMIC_RELAXED);
-    return ok;
-}
-
 static void note_pace(struct jobs *j)
 {
     uint64_t now = clock_now_ns();
@@ -279,8 +247,8 @@ static bool settle(struct jobs *j, struct flight *flight)
         fail_job(r, flight->frame, &error);
         return true;
     }
-    if (flight->picture ? keep_frame(j, r, flight->frame, flight->picture, &error)
-                        : keep_comparison(j, r, flight->compare, &error)) {
+    if (flight->picture ? jobs_keep_frame(j, r, flight->frame, flight->picture, &error)
+                        : jobs_keep_comparison(j, r, flight->compare, &error)) {
         note_pace(j);
         jobs_tell(j, r->job.id, JOB_CHANGED);
         return true;
@@ -295,12 +263,25 @@ static bool settle(struct jobs *j, struct flight *flight)
     return false;
 }
 
+/* One image of a comparison under way; what cannot be kept now is when all of it is there. */
+static void take_part(struct jobs *j, struct flight *part)
+{
+    struct running *r = part->job;
+    bool is_wanted = !is_cancelled(r) && !r->has_failed && r->frames[part->frame] != FRAME_DONE;
+    if (is_wanted && jobs_keep_frame(j, r, part->frame, part->picture, NULL))
+        jobs_tell(j, r->job.id, JOB_CHANGED);
+    picture_release(part->picture);
+    free(part);
+}
+
 static void settle_list(struct jobs *j, struct flight *list)
 {
     while (list) {
         struct flight *flight = list;
         list = flight->next;
-        if (flight->due_ns > clock_now_ns() && !is_draining(j) ? true : !settle(j, flight)) {
+        if (flight->is_part)
+            take_part(j, flight);
+        else if (flight->due_ns > clock_now_ns() && !is_draining(j) ? true : !settle(j, flight)) {
             flight->next = j->delayed;
             j->delayed = flight;
         } else {
@@ -319,6 +300,7 @@ static bool compare_out(struct jobs *j, struct flight *flight, struct pen_error 
         .payer = flight->job->job.client,
         .patience_ms = 3600000,
         .background = true,
+        .wants = compare_goes_on,
         .is_gone = is_compare_gone,
         .done = compare_done,
         .owner = flight};
@@ -361,9 +343,10 @@ static bool frame_out(struct jobs *j, struct flight *flight, struct pen_error *e
 /* The first frame that is to be done and may be begun; job.frames: none. */
 static uint32_t next_frame(struct running *r)
 {
-    if (r->has_failed || is_cancelled(r) || r->there == r->job.frames ||
-        (!r->is_settled && r->in_flight) || (r->job.kind == JOB_COMPARE && r->in_flight))
+    if (r->has_failed || is_cancelled(r) || is_complete(r) || (!r->is_settled && r->in_flight))
         return r->job.frames;
+    if (r->job.kind == JOB_COMPARE) /* in one piece */
+        return r->in_flight ? r->job.frames : 0;
     while (r->first < r->job.frames && r->frames[r->first] == FRAME_DONE)
         r->first++;
     for (uint32_t i = r->first; i < r->job.frames; i++)
@@ -422,7 +405,8 @@ static void send_out(struct jobs *j)
         note_begin(j, r);
         flight->job = r;
         flight->frame = next_frame(r);
-        r->frames[flight->frame] = FRAME_IN_FLIGHT;
+        if (r->job.kind != JOB_COMPARE)
+            r->frames[flight->frame] = FRAME_IN_FLIGHT;
         r->in_flight++;
         r->served = ++j->served;
         r->begun_ns = r->begun_ns ? r->begun_ns : clock_now_ns();
@@ -431,7 +415,8 @@ static void send_out(struct jobs *j)
                                               : frame_out(j, flight, &error);
         if (out)
             continue;
-        r->frames[flight->frame] = FRAME_TODO; /* the queue is full: that is nobody's attempt */
+        if (r->job.kind != JOB_COMPARE)
+            r->frames[flight->frame] = FRAME_TODO; /* the queue is full: that is nobody's attempt */
         r->due_ns = clock_now_ns() + BACKOFF_NS;
         free_flight(j, flight);
     }
@@ -517,7 +502,7 @@ static uint64_t next_due_ns(const struct jobs *j)
     for (const struct running *r = j->first; r; r = r->next) {
         if (r->due_ns > now)
             due = earlier(due, r->due_ns);
-        if (!r->in_flight && (r->has_failed || r->there == r->job.frames))
+        if (!r->in_flight && (r->has_failed || is_complete(r)))
             due = earlier(due, j->record_due_ns > now ? j->record_due_ns : now + RECORD_NS);
     }
     return due;

@@ -134,6 +134,26 @@ class Bounds(unittest.TestCase):
         self.assertEqual(frame(d, id, 2), picture)
         self.assertEqual(os.stat(path).st_ino, inode)
 
+    def test_comparison_goes_on(self):
+        """Killed between its last image and its document: it is made again."""
+        d, scene = self.daemon()
+        request = {"width": 40, "height": 30, "techniques": ["hard", "pcf", "vsm"],
+                   "reference": {"name": "multisample", "params": {"samples": 16}}}
+        id = post(d, "/v1/scenes/%s/compare" % scene, request,
+                  Prefer="respond-async").json()["id"]
+        first = ended(d, id) and d.get("/v1/jobs/%s/result" % id).json()
+        self.assertEqual(len([e for e in Events(d, id) if e[1] == "frame"]), 4)
+        d.stop()
+        with sqlite3.connect(os.path.join(d.store, "jobs", "jobs.db")) as database:
+            database.execute("UPDATE jobs SET state = 1, result_name = '', result_bytes = 0")
+        database.close()
+        os.remove(os.path.join(d.store, "jobs", id, "result.json"))
+        d.start()
+        done = ended(d, id)
+        self.assertEqual((done["state"], done["frames"]["done"]), ("successful", 4))
+        again = d.get(done["links"]["result"]).json()
+        self.assertEqual([m["rmse"] for m in again["methods"]], [m["rmse"] for m in first["methods"]])
+
     def test_keys_outlive_the_daemon(self):
         d, scene = self.daemon()
         body = {"scene": scene, **TINY, "sequence": {"frames": 2}}

@@ -51,25 +51,38 @@ static void see_check(void *context, const struct database_value *columns)
     *sound = columns[0].text && !strcmp(columns[0].text, "ok");
 }
 
-struct database *database_open(const char *path, struct pen_error *error)
+static struct database *connect(const char *path, int flags, struct pen_error *error)
 {
     struct database *d = pen_alloc_zero(1, sizeof *d);
-    bool sound = false;
-    int code = sqlite3_open_v2(path, &d->connection,
-        SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_NOMUTEX, NULL);
-    bool ok = code == SQLITE_OK || fail(d, code, error);
-    if (ok)
+    int code = sqlite3_open_v2(path, &d->connection, flags | SQLITE_OPEN_NOMUTEX, NULL);
+    if (code == SQLITE_OK) {
         sqlite3_busy_timeout(d->connection, BUSY_MS);
+        return d;
+    }
+    fail(d, code, error);
+    database_close(d);
+    return NULL;
+}
+
+struct database *database_open(const char *path, struct pen_error *error)
+{
+    bool sound = false;
+    struct database *d = connect(path, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE, error);
     /* FULL: an accepted job is not forgotten with the power. The write lock shows here, and not at the
      * first job, what cannot be written to. */
-    ok = ok && database_script(d, "PRAGMA journal_mode=WAL; PRAGMA synchronous=FULL;", error) &&
-         database_run(d, "PRAGMA quick_check(1)", NULL, 0, see_check, &sound, error) &&
-         (sound || fail(d, SQLITE_CORRUPT, error)) &&
-         database_script(d, "BEGIN IMMEDIATE; PRAGMA user_version=1; COMMIT;", error);
+    bool ok = d && database_script(d, "PRAGMA journal_mode=WAL; PRAGMA synchronous=FULL;", error) &&
+              database_run(d, "PRAGMA quick_check(1)", NULL, 0, see_check, &sound, error) &&
+              (sound || fail(d, SQLITE_CORRUPT, error)) &&
+              database_script(d, "BEGIN IMMEDIATE; PRAGMA user_version=1; COMMIT;", error);
     if (ok)
         return d;
     database_close(d);
     return NULL;
+}
+
+struct database *database_open_reader(const char *path, struct pen_error *error)
+{
+    return connect(path, SQLITE_OPEN_READWRITE, error);
 }
 
 void database_close(struct database *d)

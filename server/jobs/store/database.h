@@ -13,6 +13,8 @@ struct database;
 /* Opens or makes the SQLite database in this file, in WAL mode, and checks it. Errors, as of every
  * function here: PEN_UNAVAILABLE, saying whether it is locked, damaged or read-only, and PEN_FULL. */
 struct database *database_open(const char *path, struct pen_error *error);
+/* A second connection to one that is open: what it reads waits for no writer. */
+struct database *database_open_reader(const char *path, struct pen_error *error);
 void database_close(struct database *database); /* NULL is fine */
 
 /* Runs one statement and calls `row` (which may be NULL) for each row of the answer; texts hold for

@@ -16,6 +16,8 @@ const char *const job_state_names[] = {
 struct job_store {
     pthread_mutex_t lock; /* guards the database */
     struct database *database;
+    pthread_mutex_t read_lock; /* guards the reader: who reads waits for no disk */
+    struct database *reader;
 };
 
 static const char schema[] =
@@ -71,13 +73,17 @@ struct job_store *job_store_open(const char *path, struct pen_error *error)
     struct database *database = database_open(path, error);
     if (!database)
         return NULL;
-    if (!database_script(database, schema, error)) {
+    struct database *reader =
+        database_script(database, schema, error) ? database_open_reader(path, error) : NULL;
+    if (!reader) {
         database_close(database);
         return NULL;
     }
     struct job_store *s = pen_alloc_zero(1, sizeof *s);
     pthread_mutex_init(&s->lock, NULL);
+    pthread_mutex_init(&s->read_lock, NULL);
     s->database = database;
+    s->reader = reader;
     return s;
 }
 
@@ -85,18 +91,20 @@ void job_store_close(struct job_store *s)
 {
     if (!s)
         return;
+    database_close(s->reader);
     database_close(s->database);
+    pthread_mutex_destroy(&s->read_lock);
     pthread_mutex_destroy(&s->lock);
     free(s);
 }
 
-/* One statement on its own. */
-static bool run(struct job_store *s, const char *sql, const struct database_value *values,
+/* One statement that only reads. */
+static bool query(struct job_store *s, const char *sql, const struct database_value *values,
     uint32_t count, database_row *row, void *context, struct pen_error *error)
 {
-    pthread_mutex_lock(&s->lock);
-    bool ok = database_run(s->database, sql, values, count, row, context, error);
-    pthread_mutex_unlock(&s->lock);
+    pthread_mutex_lock(&s->read_lock);
+    bool ok = database_run(s->reader, sql, values, count, row, context, error);
+    pthread_mutex_unlock(&s->read_lock);
     return ok;
 }
 
@@ -233,14 +241,14 @@ static void read_key(void *context, const struct database_value *columns)
     into->found = true;
 }
 
-/* As job_store_find_key, with the lock held. */
-static bool find_key(struct job_store *s, const struct job_key *key, int64_t now_s, bool *found,
-    bool *has_job, uint8_t id[PEN_ID_BYTES], struct pen_error *error)
+/* As job_store_find_key, with the database's lock held. */
+static bool find_key(struct database *database, const struct job_key *key, int64_t now_s,
+    bool *found, bool *has_job, uint8_t id[PEN_ID_BYTES], struct pen_error *error)
 {
     struct hex print = hex_of(key->print);
     struct database_value values[] = {NUMBER(key->client), TEXT(key->text), NUMBER(now_s)};
     struct key_read read = {0};
-    bool ok = database_run(s->database,
+    bool ok = database_run(database,
         "SELECT print, job FROM keys WHERE client = $1 AND name = $2 AND (expires > $3 OR "
         "job <> '')",
         values, COUNT(values), read_key, &read, error);
@@ -256,9 +264,9 @@ static bool find_key(struct job_store *s, const struct job_key *key, int64_t now
 bool job_store_find_key(struct job_store *s, const struct job_key *key, int64_t now_s, bool *found,
     bool *has_job, uint8_t id[PEN_ID_BYTES], struct pen_error *error)
 {
-    pthread_mutex_lock(&s->lock);
-    bool ok = find_key(s, key, now_s, found, has_job, id, error);
-    pthread_mutex_unlock(&s->lock);
+    pthread_mutex_lock(&s->read_lock);
+    bool ok = find_key(s->reader, key, now_s, found, has_job, id, error);
+    pthread_mutex_unlock(&s->read_lock);
     return ok;
 }
 
@@ -302,9 +310,10 @@ bool job_store_add(struct job_store *s, struct job *job, const char *body,
     uint8_t before[PEN_ID_BYTES];
     pthread_mutex_lock(&s->lock);
     bool begun = database_begin(s->database, error);
-    bool ok = begun &&
-              (!key || find_key(s, key, job->created_s, &found, &has_job, before, error)) &&
-              (has_job || (has_room(s, job, limits, error) && insert(s, job, body, key, error)));
+    bool ok =
+        begun &&
+        (!key || find_key(s->database, key, job->created_s, &found, &has_job, before, error)) &&
+        (has_job || (has_room(s, job, limits, error) && insert(s, job, body, key, error)));
     ok = begun && database_end(s->database, ok, error);
     pthread_mutex_unlock(&s->lock);
     if (ok && has_job)
@@ -320,7 +329,7 @@ bool job_store_get(
     struct hex hex = hex_of(id);
     struct database_value values[] = {TEXT(hex.text)};
     struct job_rows read = {job, 1, 0};
-    return run(s, "SELECT " JOB_COLUMNS " FROM jobs WHERE id = $1", values, 1, read_job, &read,
+    return query(s, "SELECT " JOB_COLUMNS " FROM jobs WHERE id = $1", values, 1, read_job, &read,
                error) &&
            (read.count ||
                pen_fail(error, PEN_NOT_FOUND, "", "There is no such job, or it has expired."));
@@ -336,7 +345,7 @@ char *job_store_body(struct job_store *s, const uint8_t id[PEN_ID_BYTES])
     struct hex hex = hex_of(id);
     struct database_value values[] = {TEXT(hex.text)};
     char *body = NULL;
-    run(s, "SELECT body FROM jobs WHERE id = $1", values, 1, read_text, &body, NULL);
+    query(s, "SELECT body FROM jobs WHERE id = $1", values, 1, read_text, &body, NULL);
     return body;
 }
 
@@ -349,11 +358,11 @@ bool job_store_list(struct job_store *s, struct job_page *page, struct pen_error
         NUMBER(page->client), NUMBER(page->state), TEXT(before.text), NUMBER(page->most)};
     struct job_rows read = {page->jobs, page->most, 0};
     int64_t total = 0;
-    bool ok = run(s,
+    bool ok = query(s,
                   "SELECT " JOB_COLUMNS " FROM jobs WHERE ($1 = 0 OR client = $1) AND ($2 = 5 OR "
                   "state = $2) AND id < $3 ORDER BY id DESC LIMIT $4",
                   values, 4, read_job, &read, error) &&
-              run(s,
+              query(s,
                   "SELECT COUNT(*) FROM jobs WHERE ($1 = 0 OR client = $1) AND ($2 = 5 OR "
                   "state = $2)",
                   values, 2, read_number, &total, error);
@@ -381,7 +390,7 @@ bool job_store_active(
 {
     struct ids_read read = {0};
     bool ok =
-        run(s, "SELECT id FROM jobs WHERE state < 2 ORDER BY id", NULL, 0, read_id, &read, error);
+        query(s, "SELECT id FROM jobs WHERE state < 2 ORDER BY id", NULL, 0, read_id, &read, error);
     *ids = read.ids;
     *count = read.count;
     return ok;
@@ -394,7 +403,7 @@ bool job_store_exists(
     struct database_value values[] = {TEXT(hex.text)};
     int64_t number = 0;
     bool ok =
-        run(s, "SELECT COUNT(*) FROM jobs WHERE id = $1", values, 1, read_number, &number, error);
+        query(s, "SELECT COUNT(*) FROM jobs WHERE id = $1", values, 1, read_number, &number, error);
     *exists = number > 0;
     return ok;
 }
@@ -407,12 +416,12 @@ bool job_store_frames(struct job_store *s, const uint8_t id[PEN_ID_BYTES], uint3
     struct database_value values[] = {TEXT(hex.text), NUMBER(seq), NUMBER(most)};
     struct frames_read read = {frames, most, 0};
     int64_t number = 0;
-    bool ok = run(s,
+    bool ok = query(s,
                   "SELECT number, seq, bytes, tag, name FROM frames WHERE job = $1 AND seq > $2 "
                   "ORDER BY seq LIMIT $3",
                   values, 3, read_frame, &read, error) &&
-              (!before || run(s, "SELECT COUNT(*) FROM frames WHERE job = $1 AND seq <= $2", values,
-                              2, read_number, &number, error));
+              (!before || query(s, "SELECT COUNT(*) FROM frames WHERE job = $1 AND seq <= $2",
+                              values, 2, read_number, &number, error));
     *count = read.count;
     if (before)
         *before = (uint32_t)number;
@@ -425,7 +434,8 @@ bool job_store_frame(struct job_store *s, const uint8_t id[PEN_ID_BYTES], uint32
     struct hex hex = hex_of(id);
     struct database_value values[] = {TEXT(hex.text), NUMBER(number)};
     struct frames_read read = {frame, 1, 0};
-    return run(s, "SELECT number, seq, bytes, tag, name FROM frames WHERE job = $1 AND number = $2",
+    return query(s,
+               "SELECT number, seq, bytes, tag, name FROM frames WHERE job = $1 AND number = $2",
                values, 2, read_frame, &read, error) &&
            (read.count || pen_fail(error, PEN_NOT_FOUND, "", "This frame is not there."));
 }
@@ -463,7 +473,11 @@ bool job_store_set_settings(struct job_store *s, const uint8_t id[PEN_ID_BYTES],
 {
     struct hex hex = hex_of(id);
     struct database_value values[] = {TEXT(hex.text), TEXT(settings)};
-    return run(s, "UPDATE jobs SET settings = $2 WHERE id = $1", values, 2, NULL, NULL, error);
+    pthread_mutex_lock(&s->lock);
+    bool ok = database_run(
+        s->database, "UPDATE jobs SET settings = $2 WHERE id = $1", values, 2, NULL, NULL, error);
+    pthread_mutex_unlock(&s->lock);
+    return ok;
 }
 
 bool job_store_set_state(struct job_store *s, const struct job *job, struct pen_error *error)
@@ -556,6 +570,6 @@ static void read_state(void *context, const struct database_value *columns)
 bool job_store_read(struct job_store *s, struct job_numbers *numbers, struct pen_error *error)
 {
     memset(numbers, 0, sizeof *numbers);
-    return run(s, "SELECT state, COUNT(*), SUM(bytes) FROM jobs GROUP BY state", NULL, 0,
+    return query(s, "SELECT state, COUNT(*), SUM(bytes) FROM jobs GROUP BY state", NULL, 0,
         read_state, numbers, error);
 }

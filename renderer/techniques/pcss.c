@@ -60,7 +60,8 @@ const struct technique technique_pcss = {
         .artefacts =
             "One average depth merges near and far casters: penumbrae of both are of a width "
             "between theirs; thin blockers can be missed by the search; "
-            "seen from the centre of the light only." BLENDED_GRAIN,
+            "seen from the centre of the light only; where a texel of the map covers many pixels, "
+            "wide penumbrae of a near light have streaks of its width." BLENDED_GRAIN,
         .cost_class = PEN_COST_MEDIUM,
         .textured = false,
         .candidates = PEN_CANDIDATES("", "search_taps=32 filter_taps=64"),

@@ -35,7 +35,9 @@ static bool run(struct service *service, const sigset_t *signals)
     for (;;) {
         struct worker_pool_numbers pool;
         int which = sigtimedwait(signals, NULL, &tick);
-        if (which > 0) {
+        if (which == SIGHUP) {
+            service_reload(service);
+        } else if (which > 0) {
             log_event(LOG_INFO, "signal %d: draining", which);
             return true;
         }
@@ -71,6 +73,7 @@ int main(int argc, char **argv)
     sigaddset(&signals, SIGTERM);
     sigaddset(&signals, SIGINT);
     sigaddset(&signals, SIGUSR1);
+    sigaddset(&signals, SIGHUP);
     pthread_sigmask(SIG_BLOCK, &signals, NULL); /* before any thread, so that all inherit it */
     sigdelset(&signals, SIGUSR1);
     signal(SIGPIPE, SIG_IGN);
@@ -86,6 +89,7 @@ int main(int argc, char **argv)
     bool asked = run(service, &signals);
     pthread_t second;
     sigaddset(&signals, SIGUSR1);
+    sigdelset(&signals, SIGHUP);
     if (pthread_create(&second, NULL, wait_for_second, &signals))
         abort();
     service_destroy(service, &hurry);

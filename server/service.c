@@ -283,6 +283,29 @@ static bool start_listeners(struct service *s, struct pen_error *error)
     return s->admin != NULL;
 }
 
+static bool open_owners(struct service *s, struct pen_error *error)
+{
+    char path[CONFIG_TEXT_BYTES + 16];
+    snprintf(path, sizeof path, "%s/owners", s->config->store);
+    s->owners = owners_open(path, error);
+    return s->owners != NULL;
+}
+
+void service_reload(struct service *s)
+{
+    const struct config *c = s->config;
+    struct pen_error error = {0};
+    struct tls_identity *tls = NULL;
+    bool ok = (!s->auth || auth_reload(s->auth, c->token_file, &error)) &&
+              (!*c->tls_cert || (tls = tls_identity_load(c->tls_cert, c->tls_key, &error)));
+    if (tls)
+        door_set_tls(http_listener_door(s->listener), tls);
+    if (ok)
+        log_event(LOG_INFO, "tokens and certificates were read again");
+    else
+        log_event(LOG_ERROR, "nothing is changed: %s", error.message);
+}
+
 struct service *service_create(
     const struct config *config, const struct pen_catalogue *catalogue, struct pen_error *error)
 {
@@ -302,6 +325,14 @@ struct service *service_create(
             "Beyond loopback --token-file is needed, or --insecure if that is meant.");
         goto fail;
     }
+    s->admin_is_open = is_loopback(config->admin_listen);
+    if (!s->admin_is_open && !*config->token_file && !config->insecure.on) {
+        pen_fail(error, PEN_INVALID, "",
+            "Beyond loopback the admin listener needs --token-file, whose tokens with \"admin\" "
+            "see "
+            "the metrics, or --insecure if that is meant.");
+        goto fail;
+    }
     if (*config->token_file && !(s->auth = auth_load(config->token_file, error)))
         goto fail;
     s->openapi = pen_openapi_json(catalogue, PENUMBRA_VERSION);
@@ -311,7 +342,8 @@ struct service *service_create(
     hash_finish(hash, digest);
     pen_id_to_hex(digest, s->openapi_tag);
     if (!make_canary(s, error) ||
-        !(s->store = scene_store_open(config->store, config->store_limit.bytes, error)))
+        !(s->store = scene_store_open(config->store, config->store_limit.bytes, error)) ||
+        (s->auth && !open_owners(s, error)))
         goto fail;
     struct scheduler_limits limits = {.queue = (uint32_t)config->queue_limit,
         .client_share = (uint32_t)config->client_share,
@@ -399,6 +431,7 @@ void service_destroy(struct service *s, const bool *hurry)
         close(s->canary_blob);
     auto_runs_destroy(s->auto_runs);
     auth_destroy(s->auth);
+    owners_close(s->owners);
     free(s->openapi);
     pthread_mutex_destroy(&s->canary_lock);
     free(s);

@@ -106,7 +106,9 @@ static const struct row rows[] = {
     ROW(drain_timeout_ms, "60000", TIME,
         .help = "On SIGTERM, how long accepted requests may take to be answered."),
     ROW(token_file, "", FILE_NAME,
-        .help = "Bearer tokens, one a line, \"name token\" or \"token\"."),
+        .help = "Bearer tokens, one a line: \"name token\", and behind them scopes "
+                "(read,render,upload,admin) and limits (requests_per_s=N renders=N "
+                "stored_bytes=N). Read again on SIGHUP, as are certificates."),
     ROW(tls_cert, "", FILE_NAME, .help = "Certificate chain of the public listener, PEM."),
     ROW(tls_key, "", FILE_NAME, .help = "Its private key, PEM."),
     ROW(insecure, "off", .help = "Listen beyond loopback without tokens."),

@@ -319,10 +319,24 @@ static const struct {
     void (*handle)(struct http_exchange *x, struct service *s);
 } pages[] = {{"/livez", livez}, {"/readyz", readyz}, {"/metrics", metrics_page}};
 
+/* Whether it is alive and ready anybody may ask. */
+static bool may_see(struct http_exchange *x, struct service *s, const char *path)
+{
+    struct auth_grant grant;
+    return s->admin_is_open || !s->auth || strcmp(path, "/metrics") ||
+           (auth_check(s->auth, http_header(x, "Authorization"), &grant) &&
+               grant.scopes & AUTH_ADMIN);
+}
+
 static void end(struct http_exchange *x)
 {
     for (size_t i = 0; i < sizeof pages / sizeof *pages; i++)
         if (!strcmp(x->path, pages[i].path)) {
+            if (!may_see(x, http_listener_context(x->listener), x->path)) {
+                http_add_header(x, "WWW-Authenticate", "Bearer");
+                answer_text(x, 401, "Metrics need a token with \"admin\".\n");
+                return;
+            }
             pages[i].handle(x, http_listener_context(x->listener));
             return;
         }

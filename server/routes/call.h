@@ -34,6 +34,8 @@ struct call {
     struct pen_route_match address; /* address.route NULL: there is no such call */
     const char *label;              /* its pattern, for metrics */
     uint64_t client;                /* whose share a render uses */
+    struct auth_grant grant;        /* owner 0: no token was asked for, or none given */
+    bool renders;                   /* counts as one of the token's renders */
     struct http_trace trace;
     struct call_body body;
     const struct step *next; /* the step that follows */
@@ -44,6 +46,8 @@ struct call {
 
 /* Whose the jobs are that it asks for and about: the same after a restart. */
 uint64_t call_owner(const struct call *call);
+/* Whether it may see and end what belongs to this owner. */
+bool call_may_touch(const struct call *call, uint64_t owner);
 /* Runs steps from `first` on until one ends the row. False: one has failed, with its error. */
 bool call_run(struct call *call, const struct step *first, struct pen_error *error);
 /* Goes on with the step behind the one that waited, or answers with `failure` (NULL, PEN_OK: there

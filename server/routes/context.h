@@ -5,6 +5,7 @@
 #include "server/base/config.h"
 #include "server/base/metrics.h"
 #include "server/access/auth.h"
+#include "server/access/owners.h"
 #include "server/http/http.h"
 #include "server/jobs/jobs.h"
 #include "server/live/feed.h"
@@ -29,8 +30,10 @@ struct service {
     struct metrics *metrics;
     struct auto_runs *auto_runs;
     struct jobs *jobs;
-    struct feed *feed; /* of what the service counts */
-    struct auth *auth; /* NULL: no token is asked for */
+    struct feed *feed;     /* of what the service counts */
+    struct auth *auth;     /* NULL: no token is asked for */
+    struct owners *owners; /* NULL likewise */
+    bool admin_is_open;    /* the admin listener asks for no token */
     struct http_listener *listener, *admin;
     char *openapi, openapi_tag[PEN_ID_HEX + 1];
     uint64_t started_ns;

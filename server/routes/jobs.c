@@ -54,7 +54,7 @@ struct job_store *routes_find_job(struct call *call, struct job *job, struct pen
     struct job_store *store = jobs_store(call->service->jobs, error);
     if (!store || !job_store_get(store, call->address.id, job, error))
         return NULL;
-    if (!call->service->auth || job->client == call_owner(call))
+    if (call_may_touch(call, job->client))
         return store;
     pen_fail(error, PEN_NOT_FOUND, "", "There is no such job, or it has expired.");
     return NULL;

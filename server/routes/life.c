@@ -84,6 +84,29 @@ static enum step_end find(struct call *call, struct pen_error *error)
     return STEP_FAILED;
 }
 
+/* What a call needs, by its row. */
+static enum auth_scope scope_of(const struct pen_route *route)
+{
+    bool reads = !strcmp(route->method, "GET");
+    if (pen_upload_types((enum pen_body)route->takes) || route->id == PEN_ROUTE_scene_delete ||
+        route->id == PEN_ROUTE_image_delete)
+        return AUTH_UPLOAD;
+    return reads && route->gives != PEN_BODY_RENDERED ? AUTH_READ : AUTH_RENDER;
+}
+
+static bool enter(struct call *call, struct pen_error *error)
+{
+    struct auth *auth = call->service->auth;
+    enum auth_scope scope = scope_of(call->address.route);
+    if (!(call->grant.scopes & (scope | AUTH_ADMIN)))
+        return pen_fail(error, PEN_FORBIDDEN, "",
+            "This token does not allow this: it lacks \"%s\".", auth_scope_name(scope));
+    if (!auth_count(auth, &call->grant, clock_now_ns(), error))
+        return false;
+    call->renders = scope == AUTH_RENDER && auth_enter(auth, &call->grant, error);
+    return call->renders || scope != AUTH_RENDER;
+}
+
 static enum step_end authorise(struct call *call, struct pen_error *error)
 {
     const struct service *s = call->service;
@@ -91,18 +114,45 @@ static enum step_end authorise(struct call *call, struct pen_error *error)
     call->client = pen_fnv(PEN_FNV_START, from, strlen(from)) | 1ull << 63; /* without a token */
     if (!s->auth)
         return STEP_NEXT;
-    uint32_t token = auth_check(s->auth, http_header(call->exchange, "Authorization"));
-    if (token)
-        call->client = token;
-    if (token || call->address.route->flags & PEN_ROUTE_OPEN)
+    bool known = auth_check(s->auth, http_header(call->exchange, "Authorization"), &call->grant);
+    if (known)
+        call->client = call->grant.owner;
+    if (call->address.route->flags & PEN_ROUTE_OPEN)
         return STEP_NEXT;
+    if (known)
+        return enter(call, error) ? STEP_NEXT : STEP_FAILED;
     pen_fail(error, PEN_UNAUTHORIZED, "", "This address needs a bearer token.");
     return STEP_FAILED;
+}
+
+static uint64_t stored_bytes(void *context, const uint8_t id[PEN_ID_BYTES])
+{
+    struct service *s = context;
+    struct store_entry entry;
+    uint64_t sum = 0;
+    for (enum store_kind kind = 0; kind < STORE_KINDS; kind++)
+        sum += scene_store_find(s->store, kind, id, &entry) ? store_entry_size(&entry) : 0;
+    return sum;
+}
+
+/* The token's part of the store, as far as the length of what comes is known. */
+static bool check_part(struct call *call, struct pen_error *error)
+{
+    struct service *s = call->service;
+    uint64_t most = call->grant.stored_bytes, length = call->exchange->content_length;
+    if (!most)
+        return true;
+    uint64_t sum = owners_sum(s->owners, call->grant.owner, stored_bytes, s);
+    return (sum < most && (length == HTTP_UNKNOWN_LENGTH || length <= most - sum)) ||
+           pen_fail(error, PEN_FULL, "", "This token may store %llu bytes, and has %llu.",
+               (unsigned long long)most, (unsigned long long)sum);
 }
 
 static enum step_end admit(struct call *call, struct pen_error *error)
 {
     enum pen_body takes = (enum pen_body)call->address.route->takes;
+    if (pen_upload_types(takes) && !check_part(call, error))
+        return STEP_FAILED;
     return body_open(&call->body, call->service, takes, call->exchange, error) ? STEP_NEXT
                                                                                : STEP_FAILED;
 }
@@ -124,6 +174,8 @@ static enum step_end settle(struct call *call, struct pen_error *error)
     if (call->end_work)
         call->end_work(call, call->work);
     free(call->work);
+    if (call->renders)
+        auth_leave(call->service->auth, &call->grant);
     body_finish(&call->body, call->service);
     return STEP_NEXT;
 }

@@ -50,7 +50,10 @@ static enum step_end import(struct call *call, struct pen_error *error)
 static enum step_end answer(struct call *call, struct pen_error *error)
 {
     const struct import_task *task = &((struct importing *)call->work)->task;
+    struct owners *owners = call->service->owners;
     char hex[PEN_ID_HEX + 1];
+    if (owners && !owners_add(owners, task->id, call->grant.owner, error))
+        return STEP_FAILED;
     char *text = describe(call, task->kind, task->id, error);
     if (!text) {
         error->retry_after_s = ROUTES_BUSY_S;
@@ -158,20 +161,35 @@ bool route_image(struct call *call, struct pen_error *error)
     return text && call_json(call, 200, text);
 }
 
-bool route_scene_delete(struct call *call, struct pen_error *error)
+/* Who uploaded it lets go of it, and it goes when nobody is left. Who may do all takes it from all. */
+static bool remove_entry(struct call *call, enum store_kind kind, struct pen_error *error)
 {
     struct service *s = call->service;
-    if (!scene_store_remove(s->store, STORE_SCENES, call->address.id, error))
+    const uint8_t *id = call->address.id;
+    bool all = call->grant.scopes & AUTH_ADMIN;
+    struct store_entry entry;
+    if (s->owners && scene_store_find(s->store, kind, id, &entry)) {
+        if (!all && !owners_has(s->owners, id, call->grant.owner))
+            return pen_fail(error, PEN_FORBIDDEN, "",
+                "Only who uploaded it, or a token with \"admin\", may remove it.");
+        if (owners_remove(s->owners, id, all ? 0 : call->grant.owner))
+            goto gone;
+    }
+    if (!scene_store_remove(s->store, kind, id, error))
         return false;
-    worker_pool_drop_scene(s->pool, call->address.id);
+    if (kind == STORE_SCENES)
+        worker_pool_drop_scene(s->pool, id);
+gone:
     http_answer(call->exchange, 204, NULL, http_static(NULL, 0));
     return true;
 }
 
+bool route_scene_delete(struct call *call, struct pen_error *error)
+{
+    return remove_entry(call, STORE_SCENES, error);
+}
+
 bool route_image_delete(struct call *call, struct pen_error *error)
 {
-    if (!scene_store_remove(call->service->store, STORE_IMAGES, call->address.id, error))
-        return false;
-    http_answer(call->exchange, 204, NULL, http_static(NULL, 0));
-    return true;
+    return remove_entry(call, STORE_IMAGES, error);
 }

@@ -46,6 +46,7 @@ class Bench:
         tokens = os.path.join(self.folder.name, "tokens")
         with open(tokens, "w") as file:
             file.write("%s\n%s\n" % (PATIENT, QUICK))
+        os.chmod(tokens, 0o600)
         self.daemon = harness.Daemon("--client-share=0", "--token-file=" + tokens)
         path = os.path.join(self.folder.name, "demo.glb")
         subprocess.run([os.path.join(options.bin, "penumbra"), "generate", "demo", "-o", path],

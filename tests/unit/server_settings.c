@@ -7,6 +7,7 @@
 #include "server/base/config.h"
 #include "server/workers/quarantine.h"
 #include "tests/unit/check.h"
+#include <sys/stat.h>
 #include <unistd.h>
 
 static bool read_flags(struct config *config, const char *a, const char *b, const char *c)
@@ -128,17 +129,58 @@ static void test_auth(void)
     char path[] = "/tmp/penumbra-tokens-XXXXXX";
     int fd = mkstemp(path);
     static const char text[] =
-        "# comment\n\nfirst-token-0123456789\nbob  second-token-0123456789  \n";
+        "# comment\n\nfirst-token-0123456789\nbob  second-token-0123456789  \n"
+        "carol third-token-0123456789 read,admin requests_per_s=2 renders=1 stored_bytes=3M\n";
     CHECK(write(fd, text, sizeof text - 1) == sizeof text - 1);
     struct auth *auth = auth_load(path, NULL);
-    CHECK(auth_check(auth, "Bearer first-token-0123456789") == 1);
-    CHECK(auth_check(auth, "bearer  second-token-0123456789") == 2);
-    CHECK(auth_check(auth, "Bearer bob") == 0);
-    CHECK(auth_check(auth, "Bearer first-token-012345678") == 0);
-    CHECK(auth_check(auth, "Bearer first-token-01234567890") == 0);
-    CHECK(auth_check(auth, "Bearer ") == 0);
-    CHECK(auth_check(auth, "first-token-0123456789") == 0);
-    CHECK(auth_check(auth, NULL) == 0);
+    struct auth_grant first, bob, carol, none;
+    CHECK(auth_check(auth, "Bearer first-token-0123456789", &first) && !*first.name);
+    CHECK(first.scopes == (AUTH_READ | AUTH_RENDER | AUTH_UPLOAD));
+    CHECK(auth_check(auth, "bearer  second-token-0123456789", &bob) && bob.owner != first.owner);
+    CHECK_STR(bob.name, "bob");
+    CHECK(auth_check(auth, "Bearer third-token-0123456789", &carol));
+    CHECK(carol.scopes == (AUTH_READ | AUTH_ADMIN) && carol.stored_bytes == 3u << 20);
+    static const char *const wrong[] = {"Bearer bob", "Bearer first-token-012345678",
+        "Bearer first-token-01234567890", "Bearer ", "first-token-0123456789", NULL};
+    for (int i = 0; i < 6; i++)
+        CHECK(!auth_check(auth, wrong[i], &none) && !none.owner && !none.scopes);
+    /* Two at once, then two a second. */
+    const uint64_t second = 1000000000;
+    struct pen_error many = {0};
+    CHECK(auth_count(auth, &carol, second, NULL) && auth_count(auth, &carol, second, NULL));
+    CHECK(!auth_count(auth, &carol, second, &many) && many.code == PEN_TOO_MANY);
+    CHECK(many.retry_after_s == 1);
+    CHECK(auth_count(auth, &carol, second + second / 2, NULL));
+    CHECK(!auth_count(auth, &carol, second + second / 2, NULL));
+    for (int i = 0; i < 100; i++)
+        CHECK(auth_count(auth, &bob, second, NULL));
+    CHECK(auth_enter(auth, &carol, NULL) && !auth_enter(auth, &carol, NULL));
+    auth_leave(auth, &carol);
+    CHECK(auth_enter(auth, &carol, NULL));
+    /* Another token of the same name is the same owner; what is wrong changes nothing. */
+    static const char other[] = "bob  other-second-token-0123456789\n";
+    CHECK(!ftruncate(fd, 0) && pwrite(fd, other, sizeof other - 1, 0) == sizeof other - 1);
+    CHECK(auth_reload(auth, path, NULL));
+    CHECK(!auth_check(auth, "Bearer second-token-0123456789", &none));
+    CHECK(
+        auth_check(auth, "Bearer other-second-token-0123456789", &none) && none.owner == bob.owner);
+    static const char *const lines[] = {"bob other-second-token-0123456789 write\n",
+        "bob other-second-token-0123456789 read,\nx\n",
+        "\nbob other-second-token-0123456789 renders=0\n",
+        "bob other-second-token-0123456789 renders=-1\n",
+        "bob other-second-token-0123456789 renders=1x\n",
+        "bob other-second-token-0123456789 stored_bytes=99999999999G\n"};
+    for (int i = 0; i < 6; i++) {
+        struct pen_error fault = {0};
+        CHECK(!ftruncate(fd, 0) && pwrite(fd, lines[i], strlen(lines[i]), 0) > 0);
+        CHECK(!auth_reload(auth, path, &fault) && fault.code == PEN_INVALID);
+        CHECK(strstr(fault.message, i == 1 || i == 2 ? "Line 2 " : "Line 1 ") != NULL);
+        CHECK(auth_check(auth, "Bearer other-second-token-0123456789", &none));
+    }
+    CHECK(!fchmod(fd, 0644));
+    struct pen_error seen = {0};
+    CHECK(!auth_reload(auth, path, &seen) && strstr(seen.message, "chmod o-rwx /tmp/penumbra-tok"));
+    CHECK(!fchmod(fd, 0640));
     auth_destroy(auth);
     struct pen_error error = {0};
     CHECK(ftruncate(fd, 4) == 0);

@@ -1,0 +1,189 @@
+"""Tokens: what each may do, whose scenes are whose, and what is read again on SIGHUP."""
+import json
+import os
+import signal
+import ssl
+import threading
+import unittest
+
+import harness
+from harness import SMALL, Daemon, grid_scene, png, wait
+from test_wire import certificate
+
+TOKENS = """
+# name token scopes limits
+alice alice-alice-alice-alice
+bob bob-bob-bob-bob-bob-bob
+reader reader-reader-reader read
+drawer drawer-drawer-drawer render,read
+sender sender-sender-sender upload stored_bytes=%d
+admin admin-admin-admin-admin admin
+quick quick-quick-quick-quick read requests_per_s=3
+single single-single-single render renders=1
+"""
+
+
+def bearer(token):
+    return {"Authorization": "Bearer " + token}
+
+
+ALICE, BOB = bearer("alice-alice-alice-alice"), bearer("bob-bob-bob-bob-bob-bob")
+READER, DRAWER = bearer("reader-reader-reader"), bearer("drawer-drawer-drawer")
+SENDER, ADMIN = bearer("sender-sender-sender"), bearer("admin-admin-admin-admin")
+QUICK, SINGLE = bearer("quick-quick-quick-quick"), bearer("single-single-single")
+
+
+class Access(unittest.TestCase):
+    def daemon(self, *flags, tokens=TOKENS % 300000):
+        d = Daemon(start=False)
+        self.addCleanup(d.kill)
+        self.file = os.path.join(d.folder, "tokens")
+        self.write(tokens)
+        d.flags += ["--token-file=" + self.file, *flags]
+        return d.start()
+
+    def write(self, tokens, mode=0o600):
+        with open(self.file, "w") as file:
+            file.write(tokens)
+        os.chmod(self.file, mode)
+
+    def upload(self, d, who, n, kind="scenes"):
+        data = grid_scene(n, "of a token") if kind == "scenes" else png(n, n)
+        return d.call("POST", "/v1/" + kind, data, who)
+
+    def test_scopes(self):
+        d = self.daemon()
+        scene = self.upload(d, ALICE, 2).json()["id"]
+        path = "/v1/scenes/" + scene
+        render = lambda who: d.call("POST", path + "/render", json.dumps(SMALL), who).status
+        for n, (who, read, draw, send) in enumerate(((ALICE, 200, 200, 201), (READER, 200, 403, 403),
+                                      (DRAWER, 200, 200, 403), (SENDER, 403, 403, 201),
+                                      (ADMIN, 200, 200, 201), ({}, 401, 401, 401))):
+            with self.subTest(who=who):
+                self.assertEqual(d.call("GET", path, headers=who).status, read)
+                self.assertEqual(d.call("GET", "/v1/scenes", headers=who).status, read)
+                self.assertEqual(render(who), draw)
+                self.assertEqual(d.call("GET", path + "/render?width=32&height=32", headers=who).status, draw)
+                self.assertEqual(self.upload(d, who, 3 + n).status, send)
+                self.assertEqual(d.call("GET", "/openapi.json", headers=who).status, 200)
+        refused = d.call("POST", path + "/render", b"{}", READER).json()
+        self.assertIn('"render"', refused["detail"])
+        self.assertEqual(d.stop(), 0)
+
+    def test_owners(self):
+        d = self.daemon()
+        mine = self.upload(d, ALICE, 2).json()["id"]
+        both = self.upload(d, ALICE, 3).json()["id"]
+        self.assertEqual(self.upload(d, BOB, 3).status, 200)
+        image = self.upload(d, ALICE, 9, "images").json()["id"]
+        delete = lambda id, who, kind="scenes": d.call("DELETE", "/v1/%s/%s" % (kind, id),
+                                                       headers=who).status
+        self.assertEqual(d.stop(), 0)
+        d.start()  # it is written down
+        self.assertEqual(delete(mine, BOB), 403)
+        self.assertEqual(delete(image, BOB, "images"), 403)
+        self.assertEqual(delete(mine, READER), 403)
+        self.assertEqual(delete("0" * 64, BOB), 404)
+        self.assertEqual(delete(mine, ALICE), 204)
+        self.assertEqual(delete(image, ALICE, "images"), 204)
+        self.assertEqual(d.call("GET", "/v1/scenes/" + mine, headers=BOB).status, 404)
+        self.assertEqual(delete(both, ALICE), 204)  # she lets go of it
+        self.assertEqual(d.call("GET", "/v1/scenes/" + both, headers=BOB).status, 200)
+        self.assertEqual(delete(both, ALICE), 403)
+        self.assertEqual(delete(both, BOB), 204)
+        self.assertEqual(d.call("GET", "/v1/scenes/" + both, headers=BOB).status, 404)
+        other = self.upload(d, BOB, 4).json()["id"]
+        self.assertEqual(delete(other, ADMIN), 204)
+        self.assertEqual(self.upload(d, ALICE, 4).status, 201)
+        self.assertEqual(delete(other, BOB), 403)  # what he had is gone
+        self.assertEqual(d.stop(), 0)
+
+    def test_limits(self):
+        d = self.daemon()
+        statuses = [d.call("GET", "/v1", headers=QUICK).status for _ in range(12)]
+        self.assertEqual(statuses[:3], [200] * 3)
+        self.assertIn(429, statuses)
+        self.assertEqual(d.call("GET", "/v1", headers=ALICE).status, 200)
+        full = [self.upload(d, SENDER, n).status for n in range(30, 60)]
+        self.assertEqual(full[0], 201)
+        self.assertEqual(full[-1], 507)
+        self.assertEqual(self.upload(d, ALICE, 20).status, 201)
+        scene = self.upload(d, ALICE, 2).json()["id"]
+        ask = lambda who, side: d.exchange("POST", "/v1/scenes/%s/render" % scene,
+                                           json.dumps(dict(SMALL, width=side)), who).status
+        wait(lambda: ask(ALICE, 32) == 200)
+        with d.paused():
+            first = []
+            thread = threading.Thread(target=lambda: first.append(ask(SINGLE, 40)))
+            thread.start()
+            wait(lambda: d.metric("penumbra_renders_running") + d.metric("penumbra_queue_depth") == 1)
+            self.assertEqual(ask(SINGLE, 41), 429)
+        thread.join()
+        self.assertEqual(first, [200])
+        self.assertEqual(ask(SINGLE, 41), 200)
+        self.assertEqual(d.stop(), 0)
+
+    def test_read_again(self):
+        d = self.daemon()
+        get = lambda who: d.exchange("GET", "/v1", headers=who).status
+        new = bearer("new-alice-new-alice-new")
+        scene = self.upload(d, ALICE, 2).json()["id"]
+        self.assertEqual((get(ALICE), get(new)), (200, 401))
+        self.write("alice new-alice-new-alice-new\n")
+        os.kill(d.process.pid, signal.SIGHUP)
+        wait(lambda: get(new) == 200)
+        self.assertEqual(get(ALICE), 401)
+        for tokens, mode in (("", 0o600), ("alice short\n", 0o600), (TOKENS % 1, 0o644)):
+            before = d.log().count("nothing is changed")
+            self.write(tokens, mode)
+            os.kill(d.process.pid, signal.SIGHUP)
+            wait(lambda: d.log().count("nothing is changed") == before + 1)
+            self.assertEqual((get(ALICE), get(new)), (401, 200))
+        self.assertIn("chmod o-rwx " + self.file, d.log())
+        # The owner is the name, not the token.
+        self.assertEqual(d.call("DELETE", "/v1/scenes/" + scene, headers=new).status, 204)
+        self.assertEqual(d.stop(), 0)
+
+    def test_certificates_read_again(self):
+        d = Daemon(start=False)
+        self.addCleanup(d.kill)
+        cert, key = certificate(d.folder)
+        d.flags += ["--tls-cert=" + cert, "--tls-key=" + key]
+        d.start()
+        of = lambda: ssl.get_server_certificate(("127.0.0.1", d.port))
+        with open(cert) as file:
+            self.assertEqual(of().strip(), file.read().strip())
+        certificate(d.folder)
+        os.kill(d.process.pid, signal.SIGHUP)
+        with open(cert) as file:
+            new = file.read().strip()
+        wait(lambda: of().strip() == new)
+        with open(key, "w") as file:
+            file.write("no key")
+        os.kill(d.process.pid, signal.SIGHUP)
+        wait(lambda: "nothing is changed" in d.log())
+        self.assertEqual(of().strip(), new)
+        self.assertEqual(d.stop(), 0)
+
+    def test_beyond_loopback(self):
+        with self.assertRaisesRegex(RuntimeError, "admin listener needs --token-file"):
+            Daemon("--admin-listen=0.0.0.0:0")
+        d = self.daemon("--admin-listen=0.0.0.0:0")
+        ask = lambda path, who={}: d.exchange("GET", path, headers=who, port=d.admin_port).status
+        self.assertEqual(ask("/livez"), 200)
+        wait(lambda: ask("/readyz") == 200)
+        self.assertEqual([ask("/metrics", who) for who in ({}, ALICE, ADMIN)], [401, 401, 200])
+        self.assertEqual(d.stop(), 0)
+
+    def test_a_file_for_everybody(self):
+        d = Daemon(start=False)
+        self.addCleanup(d.kill)
+        self.file = os.path.join(d.folder, "tokens")
+        self.write(TOKENS % 1, 0o604)
+        d.flags.append("--token-file=" + self.file)
+        with self.assertRaisesRegex(RuntimeError, "chmod o-rwx"):
+            d.start()
+
+
+if __name__ == "__main__":
+    harness.main()

@@ -59,6 +59,10 @@ int main(int argc, char **argv)
         fprintf(stderr, "penumbrad: %s\n", error.message);
         return EXIT_SETTINGS;
     }
+    if (config.print_config.on) {
+        config_print(&config, stdout);
+        return 0;
+    }
     log_init(config.log_format.index);
     /* For the workers. On a software device textures are cleared memory, and to get that in large
      * pages takes a fifth of the time. Given back it leaves the process, whatever its size was: else

@@ -120,6 +120,11 @@ static const struct row rows[] = {
     ROW(worker_path, "", FILE_NAME, .help = "penumbra-worker; empty: next to penumbrad."),
     ROW(import_path, "", FILE_NAME, .help = "penumbra-import; empty: next to penumbrad."),
     ROW(log_format, "text", .choices = log_format_names, .help = "Form of the log, on stderr."),
+    ROW(config, "", FILE_NAME,
+        .help =
+            "Settings, one a line: \"queue-limit = 64\"; # begins a comment line. Variables and "
+            "flags have the last word."),
+    ROW(print_config, "off", .help = "Print all settings, as such a file, and end."),
 };
 #define ROWS (sizeof rows / sizeof *rows)
 
@@ -262,15 +267,14 @@ static bool fail_flag(const char *argument, struct pen_error *error)
         pen_suggest_end(&suggestion, end, sizeof end));
 }
 
-bool config_read(struct config *config, int argc, char **argv, struct pen_error *error)
+/* The environment, then the command line. */
+static bool read_outside(struct config *config, int argc, char **argv, struct pen_error *error)
 {
-    memset(config, 0, sizeof *config);
     for (size_t r = 0; r < ROWS; r++) {
         char name[64];
         variable_name(&rows[r], name);
         const char *text = getenv(name);
-        if (!store(&rows[r], config, rows[r].def, rows[r].name, error) ||
-            (text && !store(&rows[r], config, text, name, error)))
+        if (text && !store(&rows[r], config, text, name, error))
             return false;
     }
     for (int i = 1; i < argc; i++) {
@@ -290,9 +294,111 @@ bool config_read(struct config *config, int argc, char **argv, struct pen_error 
         if (!store(row, config, value, name, error))
             return false;
     }
+    return true;
+}
+
+/* Cuts off blanks at both ends. */
+static char *trim(char *text)
+{
+    text += strspn(text, " \t\r\n");
+    for (size_t n = strlen(text); n && strchr(" \t\r\n", text[n - 1]); n--)
+        text[n - 1] = 0;
+    return text;
+}
+
+/* A line of the file; `place` is "name:12". */
+static bool read_line(struct config *config, char *line, const char *place, struct pen_error *error)
+{
+    char flag[CONFIG_TEXT_BYTES + 64], source[256];
+    const char *ignored;
+    struct pen_error unknown = {0};
+    line = trim(line);
+    if (!*line || *line == '#')
+        return true;
+    char *value = strchr(line, '=');
+    if (value)
+        *value++ = 0;
+    snprintf(flag, sizeof flag, "--%s", trim(line));
+    const struct row *row = find_flag(flag, &ignored);
+    snprintf(source, sizeof source, "%s: %.60s", place, flag + 2);
+    if (!row) {
+        fail_flag(flag, &unknown);
+        return pen_fail(error, PEN_INVALID, "", "%s: %s", place, unknown.message);
+    }
+    if (row->offset == offsetof(struct config, config) ||
+        row->offset == offsetof(struct config, print_config))
+        return pen_fail(error, PEN_INVALID, "", "%s cannot stand in a file.", source);
+    if (!value)
+        return pen_fail(error, PEN_INVALID, "", "%s needs a value.", source);
+    return store(row, config, trim(value), source, error);
+}
+
+static bool read_file(struct config *config, struct pen_error *error)
+{
+    char line[CONFIG_TEXT_BYTES + 128], place[160], path[CONFIG_TEXT_BYTES];
+    strcpy(path, config->config);
+    FILE *file = fopen(path, "re");
+    if (!file)
+        return pen_fail(
+            error, PEN_UNAVAILABLE, "", "%.200s cannot be read: %s.", path, strerror(errno));
+    bool ok = true;
+    for (int number = 1; ok && fgets(line, sizeof line, file); number++) {
+        snprintf(place, sizeof place, "%.120s:%d", path, number);
+        ok = strlen(line) + 1 < sizeof line || feof(file)
+                 ? read_line(config, line, place, error)
+                 : pen_fail(error, PEN_INVALID, "", "%s: the line is too long.", place);
+    }
+    if (ok && ferror(file))
+        ok = pen_fail(
+            error, PEN_UNAVAILABLE, "", "%.200s cannot be read: %s.", path, strerror(errno));
+    fclose(file);
+    return ok;
+}
+
+bool config_read(struct config *config, int argc, char **argv, struct pen_error *error)
+{
+    memset(config, 0, sizeof *config);
+    for (size_t r = 0; r < ROWS; r++)
+        if (!store(&rows[r], config, rows[r].def, rows[r].name, error))
+            return false;
+    if (!read_outside(config, argc, argv, error)) /* which says where the file is */
+        return false;
+    if (*config->config && (!read_file(config, error) || !read_outside(config, argc, argv, error)))
+        return false;
     if (!*config->tls_cert != !*config->tls_key)
         return pen_fail(error, PEN_INVALID, "", "--tls-cert and --tls-key go together.");
     return true;
+}
+
+void config_print(const struct config *config, FILE *to)
+{
+    for (size_t r = 0; r < ROWS; r++) {
+        const struct row *row = &rows[r];
+        const void *at = (const char *)config + row->offset;
+        char name[64], number[24];
+        flag_name(row, name);
+        if (row->offset == offsetof(struct config, config) ||
+            row->offset == offsetof(struct config, print_config))
+            continue;
+        fprintf(to, "%s = ", name + 2);
+        switch (row->kind) {
+        case KIND_TEXT:
+            fprintf(to, "%s\n", (const char *)at);
+            break;
+        case KIND_NUMBER:
+        case KIND_SIZE:
+            print_number(row,
+                row->kind == KIND_SIZE ? ((const config_size *)at)->bytes : *(const uint64_t *)at,
+                number);
+            fprintf(to, "%s\n", number);
+            break;
+        case KIND_FLAG:
+            fprintf(to, "%s\n", ((const config_flag *)at)->on ? "on" : "off");
+            break;
+        default:
+            fprintf(to, "%s\n", row->choices[((const config_choice *)at)->index]);
+        }
+    }
 }
 
 /* "  --queue-limit N", and its help below. */

@@ -4,6 +4,7 @@
 #include "protocol/error.h"
 #include <stddef.h>
 #include <stdint.h>
+#include <stdio.h>
 
 #define CONFIG_TEXT_BYTES 1024
 typedef char config_text[CONFIG_TEXT_BYTES];
@@ -43,10 +44,15 @@ struct config {
     config_size import_memory;
     uint64_t drain_timeout_ms;
     config_choice log_format; /* enum config_log_format */
+    config_text config;       /* the file */
+    config_flag print_config;
 };
 
-/* Defaults, then the environment, then the command line. Errors: PEN_INVALID, for an unknown
- * flag, a value out of range or settings that contradict each other. */
+/* Defaults, then the file that --config names, then the environment, then the command line. Errors:
+ * PEN_INVALID, for an unknown flag, a value out of range or settings that contradict each other, with
+ * the file's line where it is its fault; PEN_UNAVAILABLE, a file that cannot be read. */
 bool config_read(struct config *config, int argc, char **argv, struct pen_error *error);
+/* All settings as a file for --config. */
+void config_print(const struct config *config, FILE *to);
 /* True when --help or --version stands on the command line; it has then been answered. */
 bool config_answer_help(int argc, char **argv);

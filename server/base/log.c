@@ -83,6 +83,10 @@ void log_write_request(const struct log_request *r)
         int n = snprintf(line, sizeof line, "%s %s %s %s %s %s %u %llu B %.1f ms", stamp,
             r->listener, r->request_id, r->client, method, target, r->status,
             (unsigned long long)r->bytes, r->ms);
+        if (r->token)
+            n += snprintf(line + n, sizeof line - (size_t)n, " token %s", r->token);
+        if (r->scene)
+            n += snprintf(line + n, sizeof line - (size_t)n, " scene %s", r->scene);
         if (r->technique)
             n += snprintf(line + n, sizeof line - (size_t)n, " %s%s queue %.1f render %.1f",
                 r->technique, r->cached ? " cached" : "", r->queue_ms, r->render_ms);
@@ -112,6 +116,10 @@ void log_write_request(const struct log_request *r)
     pen_json_uint(&json, "status", r->status);
     pen_json_uint(&json, "bytes", r->bytes);
     pen_json_double(&json, "ms", r->ms);
+    if (r->token)
+        pen_json_string(&json, "token", r->token);
+    if (r->scene)
+        pen_json_string(&json, "scene", r->scene);
     if (r->technique) {
         pen_json_string(&json, "technique", r->technique);
         pen_json_bool(&json, "cached", r->cached);

@@ -14,6 +14,8 @@ struct log_request {
     uint32_t status;
     uint64_t bytes;
     double ms;             /* from the end of the header to the last byte sent */
+    const char *scene;     /* id, or NULL */
+    const char *token;     /* its name, or NULL */
     const char *technique; /* renders only, else NULL */
     double queue_ms, render_ms;
     bool cached;

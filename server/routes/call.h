@@ -21,7 +21,8 @@ struct step {
 
 /* For the log. */
 struct call_note {
-    const char *technique; /* of renders */
+    char scene[PEN_ID_HEX + 1]; /* that was asked about, or uploaded; or "" */
+    const char *technique;      /* of renders */
     double queue_ms, render_ms;
     bool cached;
     enum pen_code code; /* PEN_OK: nothing went wrong */

@@ -62,6 +62,8 @@ static enum step_end find(struct call *call, struct pen_error *error)
     char allow[64];
     if (pen_route_find(x->method, x->path, &call->address)) {
         call->label = call->address.route->pattern;
+        if (!strncmp(call->label, "/v1/scenes/{id}", 15))
+            pen_id_to_hex(call->address.id, call->note.scene);
         return STEP_NEXT;
     }
     if (!call->address.methods) {
@@ -198,6 +200,8 @@ static enum step_end record(struct call *call, struct pen_error *error)
         .status = x->status,
         .bytes = x->body.size,
         .ms = ms,
+        .scene = *note->scene ? note->scene : NULL,
+        .token = *call->grant.name ? call->grant.name : NULL,
         .technique = note->technique,
         .queue_ms = note->queue_ms,
         .render_ms = note->render_ms,

@@ -98,6 +98,28 @@ class Access(unittest.TestCase):
         self.assertEqual(delete(other, BOB), 403)  # what he had is gone
         self.assertEqual(d.stop(), 0)
 
+    def test_log(self):
+        """A line names who, the scene, the method and the request, in both forms."""
+        d = self.daemon("--log-format=json")
+        scene = self.upload(d, ALICE, 2).json()["id"]
+        trace = "00-" + "ab" * 16 + "-" + "cd" * 8 + "-01"
+        answer = d.call("POST", "/v1/scenes/%s/render" % scene, json.dumps(SMALL),
+                        {**ALICE, "traceparent": trace})
+        self.assertEqual(answer.headers["traceparent"].split("-")[1], "ab" * 16)
+        self.assertNotEqual(answer.headers["traceparent"], trace)
+        line = lambda: [l for l in map(json.loads, d.log().splitlines())
+                        if l.get("request_id") == answer.headers["X-Request-Id"]]
+        found, = wait(line)
+        self.assertEqual((found["token"], found["scene"], found["technique"], found["trace_id"]),
+                         ("alice", scene, "hard", "ab" * 16))
+        sent = [l for l in map(json.loads, d.log().splitlines()) if l.get("method") == "POST"][0]
+        self.assertEqual((sent["scene"], sent["target"]), (scene, "/v1/scenes"))
+        self.assertEqual(d.stop(), 0)
+        plain = self.daemon()
+        answer = plain.call("GET", "/v1/scenes/" + scene, headers=BOB)
+        wait(lambda: " token bob scene %s" % scene in plain.log())
+        self.assertEqual(plain.stop(), 0)
+
     def test_limits(self):
         d = self.daemon()
         statuses = [d.call("GET", "/v1", headers=QUICK).status for _ in range(12)]

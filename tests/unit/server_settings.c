@@ -124,6 +124,63 @@ static void test_codes(void)
     CHECK(kept.code == PEN_LOST);
 }
 
+/* Lines of a file; what it says wrong, or NULL. */
+static const char *read_config(const char *text, struct config *config, const char *flag)
+{
+    static struct pen_error error;
+    char path[] = "/tmp/penumbra-config-XXXXXX", name[80];
+    int fd = mkstemp(path);
+    CHECK(write(fd, text, strlen(text)) == (ssize_t)strlen(text));
+    snprintf(name, sizeof name, "--config=%s", path);
+    char *argv[] = {"penumbrad", name, (char *)flag};
+    error = (struct pen_error){0};
+    bool ok = config_read(config, flag ? 3 : 2, argv, &error);
+    close(fd);
+    unlink(path);
+    return ok ? NULL : error.message;
+}
+
+static void test_file(void)
+{
+    static struct config config, again;
+    const char *text = "# ours\n\n  queue-limit =  7\nstore=/a b \r\nrequire-gpu = on\n"
+                       "gpu-memory = 3M\nlog-format = json";
+    CHECK(!read_config(text, &config, NULL));
+    CHECK(config.queue_limit == 7 && config.require_gpu.on && config.gpu_memory.bytes == 3 << 20);
+    CHECK(config.log_format.index == CONFIG_LOG_JSON);
+    CHECK_STR(config.store, "/a b");
+    /* A variable wins over the file, a flag over both. */
+    CHECK(!read_config(text, &again, "--queue-limit=9") && again.queue_limit == 9);
+    setenv("PENUMBRA_QUEUE_LIMIT", "8", 1);
+    CHECK(!read_config(text, &again, NULL) && again.queue_limit == 8);
+    CHECK(!read_config(text, &again, "--queue-limit=9") && again.queue_limit == 9);
+    unsetenv("PENUMBRA_QUEUE_LIMIT");
+    const struct {
+        const char *text, *said;
+    } wrong[] = {{"\n\nqueue-limit = x\n", ":3: queue-limit must be a whole number"},
+        {"queue-limt = 3\n", ":1: There is no setting --queue-limt"},
+        {"store\n", ":1: store needs a value"}, {"config = x\n", ":1: config cannot stand in"},
+        {"store = a\ntls-cert = b\n", "go together"}, {"\n= 3\n", ":2: There is no setting"}};
+    for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
+        const char *said = read_config(wrong[i].text, &again, NULL);
+        CHECK(said && strstr(said, wrong[i].said));
+    }
+    struct pen_error error = {0};
+    CHECK(!config_read(&again, 2, (char *[]){"penumbrad", "--config=/nowhere/at/all"}, &error));
+    CHECK(error.code == PEN_UNAVAILABLE && strstr(error.message, "/nowhere/at/all"));
+    /* What is printed reads back as the same. */
+    char *printed;
+    size_t bytes;
+    FILE *memory = open_memstream(&printed, &bytes);
+    config_print(&config, memory);
+    fclose(memory);
+    CHECK(!read_config(printed, &again, NULL));
+    memset(config.config, 0, sizeof config.config);
+    memset(again.config, 0, sizeof again.config);
+    CHECK(!memcmp(&config, &again, sizeof config));
+    free(printed);
+}
+
 static void test_auth(void)
 {
     char path[] = "/tmp/penumbra-tokens-XXXXXX";
@@ -294,6 +351,7 @@ int main(void)
     test_config();
     test_accept();
     test_codes();
+    test_file();
     test_auth();
     test_hosts();
     test_pages();

@@ -325,6 +325,9 @@ struct service *service_create(
             "Beyond loopback --token-file is needed, or --insecure if that is meant.");
         goto fail;
     }
+    if (!proxy_split_url(config->public_url, s->public_name, s->public_prefix, error) ||
+        !proxy_check_list(config->trusted_proxy, error))
+        goto fail;
     s->admin_is_open = is_loopback(config->admin_listen);
     if (!s->admin_is_open && !*config->token_file && !config->insecure.on) {
         pen_fail(error, PEN_INVALID, "",

@@ -62,7 +62,7 @@ static bool is_own_name(const struct guard *guard, const char *name)
         return true;
     machine[MAX_NAME - 1] = 0;
     return (!gethostname(machine, sizeof machine - 1) && !strcasecmp(machine, name)) ||
-           is_listed(guard->names, name);
+           (*guard->own && !strcasecmp(guard->own, name)) || is_listed(guard->names, name);
 }
 
 bool guard_host(const struct guard *guard, const char *host, struct pen_error *error)

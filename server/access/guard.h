@@ -6,6 +6,7 @@
 
 struct guard {
     const char *names;  /* that others than itself call this service by, with commas; "*": any */
+    const char *own;    /* another name of its own, or "" */
     const char *origin; /* whose pages may call, "*": everybody's, "": nobody else's */
 };
 

@@ -117,6 +117,12 @@ static const struct row rows[] = {
     ROW(allow_host, "", .form = "NAMES",
         .help = "Names that this service is called by, with commas, or * for any. Addresses, "
                 "names without a dot and the machine's own are always taken."),
+    ROW(public_url, "", .form = "URL",
+        .help = "What others call this service, behind a proxy: its name is taken, and links begin "
+                "with its path."),
+    ROW(trusted_proxy, "", .form = "ADDRESSES",
+        .help = "Proxies, as addresses or networks with commas, whose X-Forwarded-For, -Host and "
+                "-Prefix are believed."),
     ROW(worker_path, "", FILE_NAME, .help = "penumbra-worker; empty: next to penumbrad."),
     ROW(import_path, "", FILE_NAME, .help = "penumbra-import; empty: next to penumbrad."),
     ROW(log_format, "text", .choices = log_format_names, .help = "Form of the log, on stderr."),

@@ -23,7 +23,7 @@ enum config_log_format { CONFIG_LOG_TEXT, CONFIG_LOG_JSON };
 struct config {
     config_text listen, admin_listen, store;
     config_size store_limit;
-    config_text token_file, tls_cert, tls_key, cors_origin, allow_host;
+    config_text token_file, tls_cert, tls_key, cors_origin, allow_host, public_url, trusted_proxy;
     config_text worker_path, import_path;
     config_flag insecure;
     config_choice device; /* enum pen_device_choice */

@@ -43,6 +43,8 @@ struct call {
     void *work;              /* the handler's own, given to `end_work` when the answer is out */
     void (*end_work)(struct call *call, void *work);
     struct call_note note;
+    char prefix[PROXY_PREFIX_BYTES]; /* that links begin with, "" for none */
+    const char *host;                /* that the client asked, or NULL */
 };
 
 /* Whose the jobs are that it asks for and about: the same after a restart. */

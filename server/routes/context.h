@@ -6,6 +6,7 @@
 #include "server/base/metrics.h"
 #include "server/access/auth.h"
 #include "server/access/owners.h"
+#include "server/access/proxy.h"
 #include "server/http/http.h"
 #include "server/jobs/jobs.h"
 #include "server/live/feed.h"
@@ -33,7 +34,8 @@ struct service {
     struct feed *feed;     /* of what the service counts */
     struct auth *auth;     /* NULL: no token is asked for */
     struct owners *owners; /* NULL likewise */
-    bool admin_is_open;    /* the admin listener asks for no token */
+    char public_name[PROXY_NAME_BYTES], public_prefix[PROXY_PREFIX_BYTES]; /* of --public-url */
+    bool admin_is_open; /* the admin listener asks for no token */
     struct http_listener *listener, *admin;
     char *openapi, openapi_tag[PEN_ID_HEX + 1];
     uint64_t started_ns;

@@ -4,6 +4,7 @@
 #include "server/base/clock.h"
 #include "server/pages/pages.h"
 #include "server/routes/routes.h"
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -89,6 +90,14 @@ static void write_limits(struct pen_json *json, const struct config *config)
     pen_json_end(json);
 }
 
+static void write_link(
+    struct pen_json *json, const struct call *call, const char *key, const char *path)
+{
+    char link[PROXY_PREFIX_BYTES + 32];
+    snprintf(link, sizeof link, "%s%s", call->prefix, path);
+    pen_json_string(json, key, link);
+}
+
 bool route_service(struct call *call, struct pen_error *error)
 {
     (void)error;
@@ -125,8 +134,8 @@ bool route_service(struct call *call, struct pen_error *error)
     pen_json_uint(&json, "gpu_bytes", pool.gpu_bytes);
     write_limits(&json, s->config);
     pen_json_object(&json, "links");
-    pen_json_string(&json, "openapi", "/openapi.json");
-    pen_json_string(&json, "docs", "/docs");
+    write_link(&json, call, "openapi", "/openapi.json");
+    write_link(&json, call, "docs", "/docs");
     pen_json_string(&json, "techniques", "/v1/techniques");
     pen_json_string(&json, "scenes", "/v1/scenes");
     pen_json_string(&json, "images", "/v1/images");

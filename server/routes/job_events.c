@@ -20,6 +20,7 @@ struct events {
     bool changed, beat, closing, asleep;
     struct http_exchange *exchange;
     struct jobs *jobs;
+    char prefix[PROXY_PREFIX_BYTES];
     /* Of the thread that sends: */
     uint8_t id[PEN_ID_BYTES];
     uint32_t seq; /* of the last event that was put */
@@ -79,7 +80,7 @@ static void append_frame(
     pen_json_uint(&json, "done", done);
     pen_json_uint(&json, "total", job->frames);
     pen_json_end(&json);
-    char *data = pen_json_finish(&json, NULL);
+    char *data = proxy_put_links(pen_json_finish(&json, NULL), e->prefix);
     append(e, frame->seq, "frame", data);
     free(data);
 }
@@ -190,6 +191,7 @@ bool route_job_events(struct call *call, struct pen_error *error)
     memcpy(e->watch.id, job.id, PEN_ID_BYTES);
     e->watch.tell = tell;
     e->exchange = x;
+    strcpy(e->prefix, call->prefix);
     e->jobs = call->service->jobs;
     e->seq = seq < job.seq ? seq : job.seq;
     e->bytes = (size_t)asprintf(&e->text, "retry: %d\n\n", RETRY_MS);

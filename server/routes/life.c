@@ -46,9 +46,9 @@ static enum step_end guard(struct call *call, struct pen_error *error)
 {
     struct http_exchange *x = call->exchange;
     const struct config *config = call->service->config;
-    const struct guard own = {config->allow_host, config->cors_origin};
+    const struct guard own = {config->allow_host, call->service->public_name, config->cors_origin};
     const struct guard_request request = {.method = x->method,
-        .host = http_header(x, "Host"),
+        .host = call->host,
         .origin = http_header(x, "Origin"),
         .site = http_header(x, "Sec-Fetch-Site"),
         .authorization = http_header(x, "Authorization")};
@@ -222,6 +222,36 @@ static enum step_end bury(struct call *call, struct pen_error *error)
 
 /* ---- the listener's callbacks ---- */
 
+/* Who asks, by what name and under what path: as a proxy says that is trusted, or as it came. */
+static void find_client(struct call *call)
+{
+    struct http_exchange *x = call->exchange;
+    const struct service *s = call->service;
+    const char *proxies = s->config->trusted_proxy;
+    strcpy(call->prefix, s->public_prefix);
+    call->host = http_header(x, "Host");
+    if (!proxy_is_listed(proxies, x->client))
+        return;
+    const char *prefix = http_header(x, "X-Forwarded-Prefix");
+    const char *host = http_header(x, "X-Forwarded-Host");
+    char said[PROXY_PREFIX_BYTES];
+    if (prefix && proxy_prefix(prefix, said))
+        strcpy(call->prefix, said);
+    if (host)
+        call->host = host;
+    proxy_client(proxies, http_header(x, "X-Forwarded-For"), x->client);
+}
+
+/* A proxy may pass the path on as it is. */
+static void strip_prefix(struct call *call)
+{
+    const char *prefix = call->prefix;
+    char *path = call->exchange->path;
+    size_t bytes = strlen(prefix);
+    if (bytes && !strncmp(path, prefix, bytes) && path[bytes] == '/')
+        memmove(path, path + bytes, strlen(path + bytes) + 1);
+}
+
 /* Headers that every answer has. */
 static void add_common(struct call *call)
 {
@@ -252,6 +282,8 @@ static void begin(struct http_exchange *x, const struct pen_error *fault)
     call->label = "other";
     call->next = life;
     http_trace_read(&call->trace, http_header(x, "traceparent"));
+    find_client(call);
+    strip_prefix(call);
     add_common(call);
     call_resume(call, fault);
 }

@@ -242,8 +242,8 @@ static char *make_record(struct parts *p, bool is_last)
     struct service *s = p->service;
     const struct call *call = p->config.call;
     const struct auto_render *choice = p->config.choice;
-    char href[HREF_BYTES];
-    snprintf(href, sizeof href, "/v1/results/%s", p->shown->tag);
+    char href[HREF_BYTES + PROXY_PREFIX_BYTES];
+    snprintf(href, sizeof href, "%s/v1/results/%s", call->prefix, p->shown->tag);
     const struct pen_progress *progress = &p->shown->result.progress;
     bool stateful = pen_request_is_stateful(&p->shown->result.completed, s->catalogue);
     bool complete = is_last && progress->done >= progress->total && !stateful;

@@ -368,7 +368,7 @@ static enum step_end answer(struct call *call, struct pen_error *error)
         send_picture(call, picture);
         return STEP_OVER;
     }
-    http_add_header(x, "Content-Location", "%s", href);
+    http_add_header(x, "Content-Location", "%s%s", call->prefix, href);
     if (!call_not_modified(call, picture->tag))
         send_picture(call, picture);
     return STEP_OVER;

@@ -62,7 +62,8 @@ static enum step_end answer(struct call *call, struct pen_error *error)
     pen_id_to_hex(task->id, hex);
     if (task->kind == STORE_SCENES)
         strcpy(call->note.scene, hex);
-    http_add_header(call->exchange, "Location", "%s/%s", kind_paths[task->kind], hex);
+    http_add_header(
+        call->exchange, "Location", "%s%s/%s", call->prefix, kind_paths[task->kind], hex);
     call_json(call, task->added ? 201 : 200, text);
     return STEP_OVER;
 }

@@ -65,7 +65,7 @@ static void answer(struct call *call, const struct job *job)
 {
     char id[PEN_ID_HEX + 1];
     pen_id_to_hex(job->id, id);
-    http_add_header(call->exchange, "Location", "/v1/jobs/%s", id);
+    http_add_header(call->exchange, "Location", "%s/v1/jobs/%s", call->prefix, id);
     http_add_header(call->exchange, "Cache-Control", "no-store");
     if (call->address.route->flags & PEN_ROUTE_ASYNC)
         http_add_header(call->exchange, "Preference-Applied", "respond-async");

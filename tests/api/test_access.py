@@ -120,6 +120,46 @@ class Access(unittest.TestCase):
         wait(lambda: " token bob scene %s" % scene in plain.log())
         self.assertEqual(plain.stop(), 0)
 
+    def test_behind_a_proxy(self):
+        """Links lead through the proxy that is trusted, and through no other."""
+        said = {"X-Forwarded-Prefix": "/shadows/", "X-Forwarded-Host": "renders.example",
+                "X-Forwarded-For": "6.6.6.6, 203.0.113.9", "Host": "10.0.0.1"}
+        follow = lambda d, link, **head: d.exchange(
+            "GET", link.removeprefix("/shadows"), headers={**said, **head})
+        for flags, prefix, allowed in ((["--trusted-proxy=127.0.0.0/8", "--allow-host=renders.example"],
+                                        "/shadows", 200),
+                                       (["--public-url=https://renders.example/shadows"], "/shadows", 200),
+                                       ([], "", 200), (["--trusted-proxy=127.0.0.1"], "/shadows", 421)):
+            with self.subTest(flags=flags):
+                d = Daemon(*flags)
+                self.addCleanup(d.kill)
+                page = d.exchange("GET", "/v1", headers=said)
+                self.assertEqual(page.status, allowed)
+                if allowed == 421:
+                    continue
+                self.assertEqual(page.json()["links"]["scenes"], prefix + "/v1/scenes")
+                self.assertEqual(page.json()["links"]["docs"], prefix + "/docs")
+                sent = d.exchange("POST", "/v1/scenes", grid_scene(2), said)
+                scene = sent.headers["Location"]
+                self.assertTrue(scene.startswith(prefix + "/v1/scenes/"), scene)
+                self.assertEqual(follow(d, scene).status, 200)
+                drawn = d.exchange("POST", scene.removeprefix("/shadows") + "/render", json.dumps(SMALL), said)
+                self.assertTrue(drawn.headers["Content-Location"].startswith(prefix + "/v1/results/"))
+                self.assertEqual(follow(d, drawn.headers["Content-Location"]).body, drawn.body)
+                record = d.exchange("POST", scene.removeprefix("/shadows") + "/render", json.dumps(SMALL),
+                                    {**said, "Accept": "application/json"}).json()
+                self.assertIn('"%s/v1/results/' % prefix, json.dumps(record))
+                if "--public-url" in str(flags):  # a proxy that leaves the path as it is
+                    self.assertEqual(d.exchange("GET", "/shadows/v1/scenes").status, 200)
+                    named = d.exchange("GET", "/v1", headers={"Host": "renders.example"})
+                    self.assertEqual(named.status, 200)
+                trusted = "--trusted" in str(flags)
+                wait(lambda: ("203.0.113.9 GET /v1 " in d.log()) == trusted)
+                for path in ("/", "/docs"):
+                    text = d.exchange("GET", path).body.decode()
+                    self.assertNotRegex(text, r"""(href=|src=|fetch\(|json\(|call\()["']/""")
+                self.assertEqual(d.stop(), 0)
+
     def test_limits(self):
         d = self.daemon()
         statuses = [d.call("GET", "/v1", headers=QUICK).status for _ in range(12)]

@@ -3,6 +3,7 @@
 #include "server/http/accept.h"
 #include "server/access/auth.h"
 #include "server/access/guard.h"
+#include "server/access/proxy.h"
 #include "server/base/status.h"
 #include "server/base/config.h"
 #include "server/workers/quarantine.h"
@@ -181,6 +182,40 @@ static void test_file(void)
     free(printed);
 }
 
+static void test_proxy(void)
+{
+    const char *list = "10.0.0.0/8, ::1,192.168.1.7,2001:db8::/33";
+    static const char *const in[] = {
+        "10.1.2.3", "::1", "192.168.1.7", "::ffff:10.9.9.9", "2001:db8:7fff::1", NULL};
+    static const char *const out[] = {"11.1.2.3", "::2", "192.168.1.70", "127.0.0.1",
+        "2001:db8:8000::1", "", "unknown", "10.1.2.3/8", NULL};
+    for (int i = 0; in[i]; i++)
+        CHECK(proxy_is_listed(list, in[i]));
+    for (int i = 0; out[i]; i++)
+        CHECK(!proxy_is_listed(list, out[i]) && !proxy_is_listed("", out[i]));
+    CHECK(proxy_check_list(list, NULL) && proxy_check_list("", NULL));
+    CHECK(!proxy_check_list("10.0.0.0/33", NULL) && !proxy_check_list("host", NULL));
+    char client[64], host[PROXY_NAME_BYTES], prefix[PROXY_PREFIX_BYTES];
+    CHECK(proxy_client(list, "6.6.6.6, 7.7.7.7, 10.1.1.1", client));
+    CHECK_STR(client, "7.7.7.7"); /* what the client itself may have written is not believed */
+    CHECK(proxy_client(list, "7.7.7.7", client) && !proxy_client(list, "<script>", client));
+    CHECK(!proxy_client(list, NULL, client) && !proxy_client(list, "", client));
+    static const char *const paths[] = {"/a", "/a/b_c~d", "/a/", NULL};
+    static const char *const bad[] = {
+        "a", "/a//b", "//evil.example", "/a\"b", "/a b", "/a?b", "http://x", NULL};
+    for (int i = 0; paths[i]; i++)
+        CHECK(proxy_prefix(paths[i], prefix) && prefix[strlen(prefix) - 1] != '/');
+    for (int i = 0; bad[i]; i++)
+        CHECK(!proxy_prefix(bad[i], prefix) && !*prefix);
+    CHECK(proxy_split_url("https://a.example:8443/x/", host, prefix, NULL));
+    CHECK_STR(host, "a.example");
+    CHECK_STR(prefix, "/x");
+    CHECK(!proxy_split_url("a.example", host, prefix, NULL));
+    char *text = proxy_put_links(strdup("{\"/v1/a\":\"/v1/b\",\"c\":\"x \\\"/v1/\"}"), "/p");
+    CHECK_STR(text, "{\"/p/v1/a\":\"/p/v1/b\",\"c\":\"x \\\"/v1/\"}");
+    free(text);
+}
+
 static void test_auth(void)
 {
     char path[] = "/tmp/penumbra-tokens-XXXXXX";
@@ -260,9 +295,11 @@ static void test_hosts(void)
         "local.evil.net", "renders.example", NULL};
     static const char *const odd[] = {
         "", ":80", "a:b", "[::1", "[::1]x", "[evil.example]", ".", NULL};
-    const struct guard some = {"renders.example.com, b.example", ""}, any = {"*", ""};
+    const struct guard some = {"renders.example.com, b.example", "own.example", ""},
+                       any = {"*", "", ""};
     for (int i = 0; good[i]; i++)
         CHECK(guard_host(&some, good[i], NULL));
+    CHECK(guard_host(&some, "own.example:443", NULL) && guard_host(&some, "OWN.example", NULL));
     for (int i = 0; bad[i]; i++) {
         struct pen_error error = {0};
         CHECK(!guard_host(&some, bad[i], &error) && error.code == PEN_MISDIRECTED);
@@ -277,8 +314,9 @@ static void test_hosts(void)
 
 static void test_pages(void)
 {
-    const struct guard none = {"", ""}, known = {"renders.example.com", "https://a.example"},
-                       open = {"*", "*"};
+    const struct guard none = {"", "", ""},
+                       known = {"renders.example.com", "", "https://a.example"},
+                       open = {"*", "", "*"};
     const struct {
         struct guard_request request;
         bool none, known, open;
@@ -352,6 +390,7 @@ int main(void)
     test_accept();
     test_codes();
     test_file();
+    test_proxy();
     test_auth();
     test_hosts();
     test_pages();

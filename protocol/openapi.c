@@ -151,9 +151,8 @@ static void write_response(
     pen_json_end(json);
 }
 
-/* One query parameter whose schema is written elsewhere. */
-static void write_query(struct pen_json *json, const char *prefix, const char *name,
-    const char *schema_prefix, bool vector)
+/* Begins a query parameter; its schema follows. */
+static void open_query(struct pen_json *json, const char *prefix, const char *name, bool vector)
 {
     char text[160];
     pen_json_object(json, NULL);
@@ -164,16 +163,27 @@ static void write_query(struct pen_json *json, const char *prefix, const char *n
         pen_json_string(json, "style", "form");
         pen_json_bool(json, "explode", false);
     }
-    snprintf(text, sizeof text, SCHEMA "%s%s", schema_prefix, name);
-    write_ref(json, "schema", text);
+}
+
+static void write_query(
+    struct pen_json *json, const char *prefix, const char *name, const char *schema)
+{
+    open_query(json, prefix, name, false);
+    write_ref(json, "schema", schema);
     pen_json_end(json);
 }
 
-static void write_queries(struct pen_json *json, const char *prefix, struct pen_param_table table,
-    const char *schema_prefix)
+static void write_row_query(struct pen_json *json, const char *prefix, const struct pen_param *row)
+{
+    open_query(json, prefix, row->name, row->count > 1);
+    pen_openapi_row(json, "schema", row);
+    pen_json_end(json);
+}
+
+static void write_queries(struct pen_json *json, const char *prefix, struct pen_param_table table)
 {
     for (uint32_t r = 0; r < table.count; r++)
-        write_query(json, prefix, table.rows[r].name, schema_prefix, table.rows[r].count > 1);
+        write_row_query(json, prefix, &table.rows[r]);
 }
 
 static void write_camera_queries(struct pen_json *json)
@@ -182,8 +192,7 @@ static void write_camera_queries(struct pen_json *json)
     for (uint32_t r = 0; r < table.count; r++) {
         const struct pen_param *row = &table.rows[r];
         bool orbit = row->applies == PEN_CAMERA_BIT(PEN_CAMERA_ORBIT);
-        write_query(json, orbit ? "camera.orbit." : "camera.", row->name,
-            orbit ? "Camera/properties/orbit/properties/" : "Camera/properties/", row->count > 1);
+        write_row_query(json, orbit ? "camera.orbit." : "camera.", row);
     }
 }
 
@@ -193,28 +202,19 @@ static void write_technique_queries(struct pen_json *json, const struct pen_cata
     for (uint32_t t = 0; t < catalogue->count; t++)
         for (uint32_t r = 0; r < catalogue->items[t]->params.count; r++) {
             const struct pen_param *row = &catalogue->items[t]->params.rows[r];
-            char text[160];
             bool seen = false;
             for (uint32_t before = 0; before < t; before++)
                 seen |= pen_param_find(catalogue->items[before]->params, row->name) != NULL;
             if (seen)
                 continue;
-            pen_json_object(json, NULL);
-            snprintf(text, sizeof text, "params.%s", row->name);
-            pen_json_string(json, "name", text);
-            pen_json_string(json, "in", "query");
-            if (row->count > 1) {
-                pen_json_string(json, "style", "form");
-                pen_json_bool(json, "explode", false);
-            }
+            open_query(json, "params.", row->name, row->count > 1);
             pen_json_object(json, "schema");
             pen_json_array(json, "anyOf");
             for (uint32_t other = t; other < catalogue->count; other++) {
-                if (!pen_param_find(catalogue->items[other]->params, row->name))
-                    continue;
-                snprintf(text, sizeof text, SCHEMA "Technique-%s/properties/params/properties/%s",
-                    catalogue->items[other]->name, row->name);
-                write_ref(json, NULL, text);
+                const struct pen_param *its =
+                    pen_param_find(catalogue->items[other]->params, row->name);
+                if (its)
+                    pen_openapi_row(json, NULL, its);
             }
             pen_json_end(json);
             pen_json_end(json);
@@ -230,14 +230,14 @@ static void write_request_queries(struct pen_json *json, const struct pen_catalo
     write_ref(json, "schema", SCHEMA "TechniqueName");
     pen_json_end(json);
     write_technique_queries(json, catalogue);
-    write_queries(json, "", pen_request_table(), "RenderRequest/properties/");
-    write_queries(json, "", pen_delivery_table(), "RenderRequest/properties/");
+    write_queries(json, "", pen_request_table());
+    write_queries(json, "", pen_delivery_table());
     write_camera_queries(json);
-    write_query(json, "light.", "type", "Light/properties/", false);
-    write_queries(json, "light.", pen_light_table(), "Light/properties/");
-    write_query(json, "light.texture.", "image", "LightTexture/properties/", false);
-    write_query(json, "light.texture.", "pattern", "LightTexture/properties/", false);
-    write_queries(json, "", pen_output_table(), "Output/properties/");
+    write_query(json, "light.", "type", SCHEMA "LightType");
+    write_queries(json, "light.", pen_light_table());
+    write_query(json, "light.texture.", "image", SCHEMA "Id");
+    write_query(json, "light.texture.", "pattern", SCHEMA "LightPattern");
+    write_queries(json, "", pen_output_table());
     pen_json_object(json, NULL);
     pen_json_string(json, "name", "request");
     pen_json_string(json, "in", "query");
@@ -275,8 +275,7 @@ static void write_parameters(
     }
     if (route->flags & PEN_ROUTE_STATES)
         pen_json_raw(json, NULL,
-            "{\"name\":\"state\",\"in\":\"query\",\"schema\":{\"$ref\":\"" SCHEMA
-            "Job/properties/state\"}}");
+            "{\"name\":\"state\",\"in\":\"query\",\"schema\":{\"$ref\":\"" SCHEMA "JobState\"}}");
     if (route->flags & PEN_ROUTE_ASYNC)
         pen_json_raw(json, NULL,
             "{\"name\":\"Prefer\",\"in\":\"header\",\"description\":\"respond-async: a job, "
@@ -299,6 +298,17 @@ static void write_parameters(
     pen_json_end(json);
 }
 
+/* What the operation is about: the first word of its address behind the version. */
+static void write_tag(struct pen_json *json, const struct pen_route *route)
+{
+    char word[32];
+    const char *from = !strncmp(route->pattern, "/v1/", 4) ? route->pattern + 4 : "service";
+    snprintf(word, sizeof word, "%.*s", (int)strcspn(from, "/"), from);
+    pen_json_array(json, "tags");
+    pen_json_string(json, NULL, word);
+    pen_json_end(json);
+}
+
 static void write_operation(
     struct pen_json *json, const struct pen_route *route, const struct pen_catalogue *catalogue)
 {
@@ -308,6 +318,7 @@ static void write_operation(
     pen_json_object(json, method);
     pen_json_string(json, "operationId", route->operation);
     pen_json_string(json, "summary", route->summary);
+    write_tag(json, route);
     write_parameters(json, route, catalogue);
     if (route->takes != PEN_BODY_NONE) {
         pen_json_object(json, "requestBody");
@@ -331,7 +342,39 @@ static void write_operation(
         write_response(json, "206", "The bytes that Range names.", route->gives);
     if (route->flags & PEN_ROUTE_CONDITIONAL)
         write_response(json, "304", "If-None-Match names what this request gives.", PEN_BODY_NONE);
+    /* Which of them is said by the problem document; "default" is for generators that know no ranges. */
+    write_ref(json, "4XX", "#/components/responses/Problem");
+    write_ref(json, "5XX", "#/components/responses/Problem");
     write_ref(json, "default", "#/components/responses/Problem");
+    pen_json_end(json);
+    if (route->flags & PEN_ROUTE_OPEN) {
+        pen_json_array(json, "security");
+        pen_json_end(json);
+    }
+    pen_json_end(json);
+}
+
+/* A token is asked for where the service has any. */
+static void write_security(struct pen_json *json)
+{
+    pen_json_array(json, "security");
+    pen_json_object(json, NULL);
+    pen_json_array(json, "token");
+    pen_json_end(json);
+    pen_json_end(json);
+    pen_json_object(json, NULL);
+    pen_json_end(json);
+    pen_json_end(json);
+}
+
+static void write_security_schemes(struct pen_json *json)
+{
+    pen_json_object(json, "securitySchemes");
+    pen_json_object(json, "token");
+    pen_json_string(json, "type", "http");
+    pen_json_string(json, "scheme", "bearer");
+    pen_json_string(
+        json, "description", "One of --token-file; a service without that file asks for none.");
     pen_json_end(json);
     pen_json_end(json);
 }
@@ -362,8 +405,15 @@ char *pen_openapi_json(const struct pen_catalogue *catalogue, const char *versio
     pen_json_string(&json, "summary", "Renders glTF scenes with soft shadows.");
     pen_json_string(&json, "version", version);
     pen_json_end(&json);
+    pen_json_array(&json, "servers");
+    pen_json_object(&json, NULL);
+    pen_json_string(&json, "url", "/");
+    pen_json_end(&json);
+    pen_json_end(&json);
+    write_security(&json);
     write_paths(&json, catalogue);
     pen_json_object(&json, "components");
+    write_security_schemes(&json);
     pen_json_object(&json, "schemas");
     pen_openapi_schemas(&json, catalogue);
     pen_json_end(&json);

@@ -69,10 +69,10 @@ static void write_value(struct pen_json *json, const struct pen_param *row)
         write_component(json, row);
 }
 
-static void write_row(struct pen_json *json, const struct pen_param *row)
+void pen_openapi_row(struct pen_json *json, const char *key, const struct pen_param *row)
 {
     char description[2048]; /* a layer more is a sentence more */
-    pen_json_object(json, row->name);
+    pen_json_object(json, key);
     if (row->word) {
         const char *const words[] = {row->word, NULL};
         pen_json_array(json, "anyOf");
@@ -98,7 +98,7 @@ static void write_row(struct pen_json *json, const struct pen_param *row)
 static void write_rows(struct pen_json *json, struct pen_param_table table)
 {
     for (uint32_t r = 0; r < table.count; r++)
-        write_row(json, &table.rows[r]);
+        pen_openapi_row(json, table.rows[r].name, &table.rows[r]);
 }
 
 /* {"required": [a, b]}: both keys are there. */
@@ -208,11 +208,11 @@ static void write_camera(struct pen_json *json, const struct pen_catalogue *cata
         "bounds; without any of them the bounds are framed.");
     for (uint32_t r = 0; r < table.count; r++)
         if (table.rows[r].applies != orbit)
-            write_row(json, &table.rows[r]);
+            pen_openapi_row(json, table.rows[r].name, &table.rows[r]);
     open_object(json, "orbit", NULL);
     for (uint32_t r = 0; r < table.count; r++)
         if (table.rows[r].applies == orbit)
-            write_row(json, &table.rows[r]);
+            pen_openapi_row(json, table.rows[r].name, &table.rows[r]);
     close_object(json);
     pen_json_end(json);
     pen_json_object(json, "dependentRequired");
@@ -239,13 +239,29 @@ static void write_texture(struct pen_json *json, const struct pen_catalogue *cat
     pen_json_string(json, "$ref", SCHEMA "Id");
     pen_json_string(json, "description", "The id of an uploaded image.");
     pen_json_end(json);
-    pen_json_object(json, "pattern");
-    pen_json_string(json, "type", "string");
-    write_strings(json, "enum", pen_pattern_names);
-    pen_json_end(json);
+    write_ref(json, "pattern", SCHEMA "LightPattern");
     pen_json_end(json);
     pen_json_uint(json, "minProperties", 1);
     pen_json_uint(json, "maxProperties", 1);
+    pen_json_end(json);
+}
+
+static void write_light_pattern(struct pen_json *json, const struct pen_catalogue *catalogue)
+{
+    (void)catalogue;
+    pen_json_object(json, "LightPattern");
+    pen_json_string(json, "type", "string");
+    write_strings(json, "enum", pen_pattern_names);
+    pen_json_end(json);
+}
+
+static void write_light_type(struct pen_json *json, const struct pen_catalogue *catalogue)
+{
+    (void)catalogue;
+    pen_json_object(json, "LightType");
+    pen_json_string(json, "type", "string");
+    write_strings(json, "enum", pen_light_type_names);
+    pen_json_string(json, "default", pen_light_type_names[PEN_LIGHT_RECT]);
     pen_json_end(json);
 }
 
@@ -255,11 +271,7 @@ static void write_light(struct pen_json *json, const struct pen_catalogue *catal
     static const char *const type_key[] = {"type", NULL};
     struct pen_param_table table = pen_light_table();
     open_object(json, "Light", "A light; the rows that it takes depend on its type.");
-    pen_json_object(json, "type");
-    pen_json_string(json, "type", "string");
-    write_strings(json, "enum", pen_light_type_names);
-    pen_json_string(json, "default", pen_light_type_names[PEN_LIGHT_RECT]);
-    pen_json_end(json);
+    write_ref(json, "type", SCHEMA "LightType");
     write_rows(json, table);
     write_ref(json, "texture", SCHEMA "LightTexture");
     pen_json_end(json);
@@ -285,19 +297,25 @@ static void write_light(struct pen_json *json, const struct pen_catalogue *catal
     pen_json_end(json);
 }
 
-static void write_request(struct pen_json *json, const struct pen_catalogue *catalogue)
+static void write_lights(struct pen_json *json, const struct pen_catalogue *catalogue)
 {
     (void)catalogue;
-    open_object(json, "RenderRequest", "Every key may be left out; {} gives a picture.");
-    write_ref(json, "technique", SCHEMA "Technique");
-    write_ref(json, "camera", SCHEMA "Camera");
-    pen_json_object(json, "lights");
+    pen_json_object(json, "Lights");
     pen_json_string(json, "type", "array");
     pen_json_uint(json, "maxItems", PEN_MAX_LIGHTS);
     write_ref(json, "items", SCHEMA "Light");
     pen_json_string(json, "description",
         "Left out: the scene's own lights, else one that suits its bounds. Empty: ambient only.");
     pen_json_end(json);
+}
+
+static void write_request(struct pen_json *json, const struct pen_catalogue *catalogue)
+{
+    (void)catalogue;
+    open_object(json, "RenderRequest", "Every key may be left out; {} gives a picture.");
+    write_ref(json, "technique", SCHEMA "Technique");
+    write_ref(json, "camera", SCHEMA "Camera");
+    write_ref(json, "lights", SCHEMA "Lights");
     write_rows(json, pen_request_table());
     write_ref(json, "output", SCHEMA "Output");
     write_rows(json, pen_delivery_table());
@@ -310,16 +328,6 @@ static void write_output(struct pen_json *json, const struct pen_catalogue *cata
     open_object(json, "Output", NULL);
     write_rows(json, pen_output_table());
     close_object(json);
-}
-
-/* Rows that a render request has too. */
-static void write_row_refs(struct pen_json *json, struct pen_param_table table)
-{
-    for (uint32_t r = 0; r < table.count; r++) {
-        char target[96];
-        snprintf(target, sizeof target, SCHEMA "RenderRequest/properties/%s", table.rows[r].name);
-        write_ref(json, table.rows[r].name, target);
-    }
 }
 
 static void write_compare(struct pen_json *json, const struct pen_catalogue *catalogue)
@@ -335,9 +343,9 @@ static void write_compare(struct pen_json *json, const struct pen_catalogue *cat
         "{\"description\":\"Left out: raytraced with 1024 samples.\",\"$ref\":\"" SCHEMA
         "Technique\"}");
     write_ref(json, "camera", SCHEMA "Camera");
-    write_ref(json, "lights", SCHEMA "RenderRequest/properties/lights");
-    write_row_refs(json, pen_request_table());
-    write_row_refs(json, pen_delivery_table());
+    write_ref(json, "lights", SCHEMA "Lights");
+    write_rows(json, pen_request_table());
+    write_rows(json, pen_delivery_table());
     close_object(json);
 }
 
@@ -368,14 +376,14 @@ static void write_sequence(struct pen_json *json, const struct pen_catalogue *ca
         "the first keyframe and after the last nothing moves.\",\"items\":{\"type\":\"object\","
         "\"required\":[\"frame\"],\"additionalProperties\":false,\"properties\":{\"frame\":{"
         "\"type\":\"integer\",\"minimum\":0,\"maximum\":9999},\"camera\":{\"$ref\":\"" SCHEMA
-        "Camera\"},\"lights\":{\"$ref\":\"" SCHEMA "RenderRequest/properties/lights\"}}}}");
+        "Camera\"},\"lights\":{\"$ref\":\"" SCHEMA "Lights\"}}}}");
     close_object(json);
     write_ref(json, "technique", SCHEMA "Technique");
     write_ref(json, "camera", SCHEMA "Camera");
-    write_ref(json, "lights", SCHEMA "RenderRequest/properties/lights");
-    write_row_refs(json, pen_request_table());
+    write_ref(json, "lights", SCHEMA "Lights");
+    write_rows(json, pen_request_table());
     write_ref(json, "output", SCHEMA "Output");
-    write_row_refs(json, pen_delivery_table());
+    write_rows(json, pen_delivery_table());
     pen_json_end(json);
     write_strings(json, "required", required);
     pen_json_end(json);

@@ -6,8 +6,8 @@ import sys
 
 import tree
 
-LABELS = {"unit", "gl", "accuracy", "api", "fuzz", "load", "lint", "bench", "smoke", "browser"}
-ALONE = {"gl", "accuracy", "api", "load", "bench", "browser"}
+LABELS = {"unit", "gl", "accuracy", "api", "fuzz", "load", "lint", "bench", "web", "smoke", "browser"}
+ALONE = {"gl", "accuracy", "api", "load", "bench", "web", "browser"}
 
 
 def main():

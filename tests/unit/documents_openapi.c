@@ -36,6 +36,8 @@ static void walk(const cJSON *node)
     for (const cJSON *child = node->child; child; child = child->next) {
         if (child->string && !strcmp(child->string, "$ref")) {
             refs++;
+            /* Generators of clients do not follow these. */
+            CHECK(!strstr(child->valuestring, "/properties/"));
             if (!cJSON_IsString(child) || !resolve(child->valuestring))
                 fprintf(stderr, "dangling: %s\n", child->valuestring), check_failures++;
         }
@@ -67,7 +69,7 @@ static void check_row(const struct pen_param *row, const char *where)
     }
     described = 0;
     count_help(root, row->help);
-    CHECK(described == 1);
+    CHECK(described >= 1);
     const cJSON *value = member(schema, "default"), *one = schema, *described_by = schema;
     if (row->word) { /* instead of the other */
         const cJSON *kinds = member(schema, "anyOf");

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Whether the daemon is still up on Monday.
 
-    endure.py [--bin DIR] [--minutes 30] [--seed 1] [kills] [stopped] [compares] [restarts] [soak]
+    endure.py [--bin DIR] [--minutes 30] [--seed 1] [kills] [stopped] [compares] [restarts] [scenes] [soak]
 
 kills     The worker is killed every two seconds while three clients ask: errors, and how soon the
           next one takes jobs. A sixth of the --minutes. Must hold: no error, 500 ms.
@@ -10,6 +10,9 @@ stopped   The worker is stopped (SIGSTOP): how soon /readyz says so, and when pi
 compares  32 comparisons at once: what became of them. Must hold: those let in are all done.
 restarts  50 restarts (SIGTERM, then a new daemon on the same store and port) while three clients
           ask: accepted requests that got no answer. Must hold: none.
+scenes    200 scenes that take twice --gpu-memory (256M), in random order, 600 pictures: whether every
+          picture of a scene is the same bytes, and the worker's peak beside the budget. Must hold:
+          all of them, budget + 150 MiB.
 soak      Everything that changes for --minutes: methods, sizes, scenes that come and go, comparisons,
           clients that leave: memory, descriptors, GPU memory and programs, and their slopes over the
           second half (Theil and Sen's median of slopes). Must hold: within what --slack allows.
@@ -33,6 +36,7 @@ sys.path[:0] = [FOLDER, os.path.join(FOLDER, ".."), os.path.join(FOLDER, "../../
 import memory  # noqa: E402
 
 CLIENTS = 3
+BUDGET_MIB = 256
 BACK_MS, NOT_READY_S, RECOVERED_S = 500, 3, 12
 SAMPLES = 240  # of what is watched in a soak
 # How much may come a minute in the second half of a soak: noise of a quarter of an hour, no leak of a
@@ -202,6 +206,25 @@ class Endurance:
         self.judge("exits", set(status), set(status) == {0})
         self.close(daemon)
 
+    def scenes(self):
+        print("scenes")
+        daemon, _ = self.daemon("--gpu-memory=%dM" % BUDGET_MIB, "--store-limit=0")
+        dice, ids, first, bad = random.Random(self.options.seed), [], {}, 0
+        for n in range(200):  # about 2 n^2 triangles: 2.6 MiB each in GPU memory
+            ids.append(daemon.upload(self.harness.grid_scene(dice.randrange(100, 220), "of 200: %d" % n)))
+        total = sum(daemon.get("/v1/scenes/" + i).json()["gpu_bytes"] for i in ids) / 2**20
+        order = ids * 3
+        dice.shuffle(order)
+        for scene in order:
+            answer = daemon.render(scene, {"width": 64, "height": 48, "technique": "pcss"})
+            same = first.setdefault(scene, answer.body) == answer.body
+            bad += answer.status != 200 or not same
+        peak = memory.resident(daemon.worker(), "VmHWM")
+        self.judge("wrong of %d pictures of %.0f MiB of scenes" % (len(order), total), bad,
+                   not bad and total >= 2 * BUDGET_MIB)
+        self.judge("peak of the worker", "%.0f MiB" % peak, peak <= BUDGET_MIB + 150)
+        self.close(daemon)
+
     def watched(self, daemon):
         worker = daemon.worker()
         return {"daemon MiB": memory.resident(daemon.process.pid, "VmRSS"),
@@ -278,7 +301,7 @@ def main():
     parser.add_argument("--bin", default=os.path.join(FOLDER, "../../../build/dev/bin"))
     parser.add_argument("--minutes", type=float, default=30)
     parser.add_argument("--seed", type=int, default=1)
-    names = ("kills", "stopped", "compares", "restarts", "soak")
+    names = ("kills", "stopped", "compares", "restarts", "scenes", "soak")
     parser.add_argument("what", nargs="*", help=", ".join(names))
     options = parser.parse_args()
     if not set(options.what) <= set(names):

@@ -450,6 +450,8 @@ struct link *link_create(const struct link_config *config, int client,
 
 void link_destroy(struct link *link)
 {
+    if (!link)
+        return;
     link_cut(link);
     tls_destroy(link->tls);
     leave(link, link->client);

@@ -7,6 +7,7 @@
 #include "server/wire/peers.h"
 #include "server/wire/spares.h"
 #include <errno.h>
+#include <poll.h>
 #include <netdb.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
@@ -282,6 +283,13 @@ static void admit(struct door *door, int fd, const struct sockaddr_storage *from
     pump(door, link, 0);
 }
 
+/* accept4 wants a descriptor before it looks whether anybody is there. */
+static bool is_queued(const struct door *door)
+{
+    struct pollfd watch = {door->listen_fd, POLLIN, 0};
+    return poll(&watch, 1, 0) > 0;
+}
+
 /* Accepts what is queued, or some of it: the rest has its turn after what moves already. */
 static void accept_some(struct door *door, uint32_t most)
 {
@@ -291,7 +299,10 @@ static void accept_some(struct door *door, uint32_t most)
         socklen_t bytes = sizeof from;
         int fd = accept4(
             door->listen_fd, (struct sockaddr *)&from, &bytes, SOCK_CLOEXEC | SOCK_NONBLOCK);
-        if (fd < 0 && spares_are_needed() && !helped) {
+        bool starved = fd < 0 && spares_are_needed();
+        if (starved && !is_queued(door))
+            return;
+        if (starved && !helped) {
             /* Those in the queue have waited long enough: somebody else makes room, or a spare. */
             helped = true;
             displace(door, &(struct wanted){.dying = true});
@@ -299,9 +310,9 @@ static void accept_some(struct door *door, uint32_t most)
             spares_give(&door->spares, 1);
             continue;
         }
-        if (fd < 0 && spares_are_needed())
+        if (starved)
             door->deaf = true; /* trying at once would spin */
-        if (fd < 0 && (errno == EINTR || errno == ECONNABORTED))
+        if (fd < 0 && !starved && (errno == EINTR || errno == ECONNABORTED))
             continue;
         if (fd < 0)
             return;

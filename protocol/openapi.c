@@ -113,6 +113,9 @@ static void write_content(struct pen_json *json, enum pen_body body)
     case PEN_BODY_PAGE:
         write_media(json, "text/html", NULL);
         break;
+    case PEN_BODY_MODULE:
+        write_media(json, "text/javascript", NULL);
+        break;
     default:
         write_media(json, "application/json", schemas[body]);
     }

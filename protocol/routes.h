@@ -24,6 +24,7 @@ enum pen_body {
     PEN_BODY_PICTURE,  /* an image */
     PEN_BODY_RENDERED, /* a rendered image, its record, or either as it gets better */
     PEN_BODY_PAGE,     /* HTML */
+    PEN_BODY_MODULE,   /* JavaScript */
     PEN_BODY_EVENTS,   /* what becomes of a job */
     PEN_BODY_LIVE,     /* what the service counts */
     PEN_BODY_FRAME,    /* an image, or the request that gives it */

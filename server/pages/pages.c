@@ -1,8 +1,10 @@
 #include "server/pages/pages.h"
 
-#define PAGE(symbol, file)                                                                         \
+#define EMBED(symbol, file)                                                                        \
     __asm__(".section .rodata\n.global " #symbol "\n.global " #symbol "_end\n" #symbol             \
-            ":\n.incbin \"" PAGES_FOLDER "/" file "\"\n" #symbol "_end:\n.byte 0\n.previous\n")
+            ":\n.incbin \"" file "\"\n" #symbol "_end:\n.byte 0\n.previous\n")
 
-PAGE(page_home, "home.html");
-PAGE(page_docs, "docs.html");
+EMBED(page_home, PAGES_FOLDER "/home.html");
+EMBED(page_docs, PAGES_FOLDER "/docs.html");
+EMBED(module_client, MODULES_FOLDER "/penumbra.js");
+EMBED(module_view, MODULES_FOLDER "/penumbra-view.js");

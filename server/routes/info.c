@@ -2,6 +2,7 @@
 #include "protocol/json_result.h"
 #include "protocol/json_sequence.h"
 #include "server/base/clock.h"
+#include "server/base/hash.h"
 #include "server/pages/pages.h"
 #include "server/routes/routes.h"
 #include <stdio.h>
@@ -28,6 +29,34 @@ bool route_docs(struct call *call, struct pen_error *error)
 {
     (void)error;
     return answer_page(call, page_docs, (size_t)(page_docs_end - page_docs));
+}
+
+/* For pages of any origin that may call; asked for again each time, and sent when it is another. */
+static bool answer_module(struct call *call, const char *text, size_t bytes)
+{
+    char tag[PEN_ID_HEX + 1];
+    uint8_t digest[PEN_ID_BYTES];
+    struct hash *hash = hash_create();
+    hash_add(hash, text, bytes);
+    hash_finish(hash, digest);
+    pen_id_to_hex(digest, tag);
+    http_add_header(call->exchange, "Cache-Control", "no-cache");
+    if (!call_not_modified(call, tag))
+        http_answer(
+            call->exchange, 200, "text/javascript; charset=utf-8", http_static(text, bytes));
+    return true;
+}
+
+bool route_client_module(struct call *call, struct pen_error *error)
+{
+    (void)error;
+    return answer_module(call, module_client, (size_t)(module_client_end - module_client));
+}
+
+bool route_view_module(struct call *call, struct pen_error *error)
+{
+    (void)error;
+    return answer_module(call, module_view, (size_t)(module_view_end - module_view));
 }
 
 bool route_openapi(struct call *call, struct pen_error *error)

@@ -2,6 +2,7 @@
 import hashlib
 import http.client
 import json
+import os
 import re
 import sys
 import unittest
@@ -62,6 +63,14 @@ class Contract(unittest.TestCase):
             self.assertEqual(page.status, 200)
             self.assertTrue(page.headers["Content-Type"].startswith("text/html"))
             self.assertIn("Content-Security-Policy", page.headers)
+
+    def test_modules(self):
+        for name in ("penumbra.js", "penumbra-view.js"):
+            module = self.d.get("/" + name)
+            with open(os.path.join(os.path.dirname(__file__), "../../clients/js", name), "rb") as file:
+                self.assertEqual(module.body, file.read())
+            again = self.d.get("/" + name, If_None_Match=module.headers["ETag"])
+            self.assertEqual((again.status, again.body), (304, b""))
 
     def test_openapi_conditional(self):
         first = self.d.get("/openapi.json")

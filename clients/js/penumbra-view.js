@@ -164,7 +164,7 @@ export class PenumbraView extends Base {
   #client = null;
   #orbit = null; // known from the first picture on
   #home = null;
-  #lights = null; // where the first picture had them: else they would go with the camera
+  #held = null; // lights as the first picture had them: else they would go with the camera
   #pace = new Pace();
   #latest = new Latest((question, signal) => this.#answer(question, signal));
   #pointers = new Map();
@@ -267,7 +267,7 @@ export class PenumbraView extends Base {
   #changed(name) {
     if (name === "server" || name === "token") this.#client = null;
     if (["server", "scene", "camera"].includes(name)) this.#orbit = this.#home = null;
-    if (["server", "scene", "lights"].includes(name)) this.#lights = null;
+    if (["server", "scene", "lights"].includes(name)) this.#held = null;
     this.#dress();
     this.#ask();
   }
@@ -300,11 +300,11 @@ export class PenumbraView extends Base {
     const ratio = Math.min(globalThis.devicePixelRatio || 1, 2);
     const scale = brief ? this.#pace.scale : 1;
     const side = (given, shown) => Math.max(1, Math.round((given ?? shown * ratio) * scale));
-    const request = { ...this.request, width: side(this.width, this.clientWidth || 640),
+    const request = { ...(this.lights ? {} : this.#held), ...this.request, width: side(this.width, this.clientWidth || 640),
       height: side(this.height, this.clientHeight || 480) };
-    const name = this.technique, params = this.params, lights = this.lights ?? this.#lights;
+    const name = this.technique, params = this.params;
     if (name) request.technique = params ? { name, params } : name;
-    if (lights) request.lights = lights;
+    if (this.lights) request.lights = this.lights;
     if (this.#orbit) request.camera = this.#orbit.camera;
     else if (this.camera) request.camera = this.camera;
     if (brief) request.output = { ...request.output, format: "jpeg" };
@@ -372,13 +372,13 @@ export class PenumbraView extends Base {
   }
 
   /** What the daemon chose is kept while the view moves. */
-  #adopt({ camera, lights }) {
+  #adopt({ camera, lights, exposure_ev, sky_level }) {
     if (!this.#orbit && camera?.eye) {
       this.#home = camera;
       this.#orbit = Orbit.from(camera);
       this.#tell("camerachange", { camera: this.#orbit.camera, user: false });
     }
-    this.#lights ??= lights ?? null;
+    this.#held ??= { lights, exposure_ev, sky_level };
   }
 
   async #draw(blob, signal) {

@@ -123,8 +123,8 @@ export class JobHandle {
    * @returns {Promise<Blob>}
    */
   async result({ signal } = {}) {
-    if (!this.job.links.result) await this.finished({ signal });
-    return (await this.#client.call(this.job.links.result, { signal })).blob();
+    const { links } = this.job.links.result ? this.job : await this.finished({ signal });
+    return (await this.#client.call(/** @type {string} */ (links.result), { signal })).blob();
   }
 
   /**
@@ -173,9 +173,9 @@ export class Penumbra {
         failure = await readProblem(answer);
       } catch (reason) {
         if (init.signal?.aborted) throw init.signal.reason;
+        const { cause, message } = /** @type {any} */ (reason);
         failure = new PenumbraError({ title: "The service does not answer.", status: 0,
-          detail: "The service does not answer: " + (reason?.cause?.code ?? reason?.message),
-          retryable: true });
+          detail: "The service does not answer: " + (cause?.code ?? message), retryable: true });
       }
       const later = [0, 429, 503].includes(failure.status) && failure.retryable;
       if (!later || tried >= this.retries) throw failure;
@@ -493,7 +493,7 @@ function anySignal(/** @type {(AbortSignal | undefined)[]} */ ...signals) {
 
 async function makeKey() {
   // Node 18 has no global one.
-  const source = globalThis.crypto ?? (await import("node:crypto")).webcrypto;
+  const node = "node:crypto", source = globalThis.crypto ?? (await import(node)).webcrypto;
   const bytes = source.getRandomValues(new Uint8Array(16));
   return [...bytes].map(byte => byte.toString(16).padStart(2, "0")).join("");
 }
@@ -513,7 +513,8 @@ function uploadBody(/** @type {Bytes | Iterable<File>} */ data) {
  * The events of a stream (HTML standard, section 9.2.6), data as JSON.
  * @returns {AsyncGenerator<ServerEvent>}
  */
-export async function* readEvents(/** @type {ReadableStream<Uint8Array>} */ stream) {
+export async function* readEvents(/** @type {ReadableStream<Uint8Array> | null} */ stream) {
+  if (!stream) return;
   const reader = stream.getReader(), decoder = new TextDecoder();
   let text = "", id = "", event = "", /** @type {string[]} */ data = [];
   try {

@@ -61,6 +61,23 @@ class OpenApi(unittest.TestCase):
         self.assertEqual([(p["ruleId"], p["message"], p["location"][0]["pointer"])
                           for p in problems if p["ruleId"] != "info-license"], [])
 
+    def test_types_of_the_javascript_client(self):
+        """Its comments are types that hold, and they are those of the document."""
+        for name in ("penumbra.js", "types.py"):
+            shutil.copy(os.path.join(HERE, "../../clients/js", name), self.work)
+        shutil.copy(os.path.join(HERE, "typed_use.ts"), self.work)
+        subprocess.run([sys.executable, "-B", "types.py", "openapi.json", "schemas.d.ts"],
+                       cwd=self.work, check=True)
+        strict = ("--strict", "--target", "es2022", "--module", "esnext", "--moduleResolution",
+                  "bundler", "--lib", "es2023,dom,dom.iterable,dom.asynciterable")
+        for arguments in (("--allowJs", "--checkJs", "--declaration", "--emitDeclarationOnly",
+                           "--outDir", "declared", "penumbra.js"),
+                          ("--noEmit", os.path.join("declared", "typed_use.ts"))):
+            run = self.run_tool("tsc", *strict, *arguments)
+            self.assertEqual(run.returncode, 0, run.stdout.decode()[-3000:])
+            for name in ("typed_use.ts", "schemas.d.ts"):
+                shutil.copy(os.path.join(self.work, name), os.path.join(self.work, "declared"))
+
     def test_generated_client(self):
         run = self.run_tool("openapi-ts", "-i", "openapi.json", "-o", "client", "-c",
                             "@hey-api/client-fetch")

@@ -1,5 +1,7 @@
 /* penumbrad: settings, signals, and the life of the service. */
+#include "protocol/openapi.h"
 #include "renderer/catalogue/catalogue.h"
+#include "server/auto/choice.h"
 #include "server/base/log.h"
 #include "server/service.h"
 #include <errno.h>
@@ -61,6 +63,12 @@ int main(int argc, char **argv)
     }
     if (config.print_config.on) {
         config_print(&config, stdout);
+        return 0;
+    }
+    if (config.print_openapi.on) {
+        char *document = pen_openapi_json(auto_catalogue(&pen_catalogue), PENUMBRA_VERSION);
+        puts(document);
+        free(document);
         return 0;
     }
     log_init(config.log_format.index);

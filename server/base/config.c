@@ -131,8 +131,17 @@ static const struct row rows[] = {
             "Settings, one a line: \"queue-limit = 64\"; # begins a comment line. Variables and "
             "flags have the last word."),
     ROW(print_config, "off", .help = "Print all settings, as such a file, and end."),
+    ROW(print_openapi, "off", .help = "Print /openapi.json, for makers of clients, and end."),
 };
 #define ROWS (sizeof rows / sizeof *rows)
+
+/* The others are only of one start. */
+static bool is_setting(const struct row *row)
+{
+    return row->offset != offsetof(struct config, config) &&
+           row->offset != offsetof(struct config, print_config) &&
+           row->offset != offsetof(struct config, print_openapi);
+}
 
 static void flag_name(const struct row *row, char *text)
 {
@@ -331,8 +340,7 @@ static bool read_line(struct config *config, char *line, const char *place, stru
         fail_flag(flag, &unknown);
         return pen_fail(error, PEN_INVALID, "", "%s: %s", place, unknown.message);
     }
-    if (row->offset == offsetof(struct config, config) ||
-        row->offset == offsetof(struct config, print_config))
+    if (!is_setting(row))
         return pen_fail(error, PEN_INVALID, "", "%s cannot stand in a file.", source);
     if (!value)
         return pen_fail(error, PEN_INVALID, "", "%s needs a value.", source);
@@ -383,8 +391,7 @@ void config_print(const struct config *config, FILE *to)
         const void *at = (const char *)config + row->offset;
         char name[64], number[24];
         flag_name(row, name);
-        if (row->offset == offsetof(struct config, config) ||
-            row->offset == offsetof(struct config, print_config))
+        if (!is_setting(row))
             continue;
         fprintf(to, "%s = ", name + 2);
         switch (row->kind) {

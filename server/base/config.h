@@ -45,7 +45,7 @@ struct config {
     uint64_t drain_timeout_ms;
     config_choice log_format; /* enum config_log_format */
     config_text config;       /* the file */
-    config_flag print_config;
+    config_flag print_config, print_openapi;
 };
 
 /* Defaults, then the file that --config names, then the environment, then the command line. Errors:

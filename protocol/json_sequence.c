@@ -163,8 +163,8 @@ static bool goes_between(const struct pen_param *row, const void *object)
 static const struct pen_param *first_unlike(
     struct pen_param_table table, uint32_t bit, const void *a, const void *b)
 {
-    for (uint32_t i = 0; i < table.count; i++) {
-        const struct pen_param *row = &table.rows[i];
+    const struct pen_param *row = table.rows;
+    for (uint32_t i = 0; i < table.count; i++, row++) {
         if (row->applies && !(row->applies & bit))
             continue;
         bool means_zero = !strcmp(row->name, "distance") || !strcmp(row->name, "power_w");

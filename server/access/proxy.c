@@ -160,7 +160,7 @@ char *proxy_put_links(char *text, const char *prefix)
         if (at > text && at[-1] == '\\')
             continue; /* within somebody's text */
         to = (char *)memcpy(to, from, (size_t)(at + 1 - from)) + (at + 1 - from);
-        to = (char *)memcpy(to, prefix, step) + step;
+        to = stpcpy(to, prefix);
         from = at + 1;
     }
     strcpy(to, from);

@@ -87,7 +87,7 @@ int main(void)
     size_t bytes = 2 * FRAMING_MAX_HEAD;
     char *endless = malloc(bytes);
     memset(endless, 'a', bytes);
-    memcpy(endless, "GET /", 5);
+    memcpy(endless, "GET /", sizeof "GET /" - 1);
     size_t used;
     CHECK(read_request(endless, bytes, 100, &used) == PEN_URI_TOO_LONG);
     memcpy(endless, HEAD "A: ", sizeof HEAD - 1 + 3);

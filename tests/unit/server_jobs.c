@@ -74,7 +74,7 @@ static void states(void)
         CHECK(get(s, e).state == JOB_ACCEPTED && get(s, e).client == 7);
         CHECK(go_on(s, e, JOB_RUNNING, 0));
         CHECK(go_on(s, e, ends[e], 2000));
-        for (uint8_t other = 0; other < JOB_STATES; other++)
+        for (int other = 0; other < JOB_STATES; other++)
             CHECK(!go_on(s, e, (enum job_state)other, 3000));
         struct job job = get(s, e);
         CHECK(job.state == ends[e] && job.expires_s == 2000 && job.ended_s == 1999);

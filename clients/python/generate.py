@@ -200,12 +200,14 @@ def generate(document):
     for target in document["components"]["schemas"]:
         types.define(target)
     version = document["info"]["version"]
-    methods = []
+    methods, hooks = [], []
     for schema, name, gives, summary, more in CALLS:
         methods += call(types, document["components"]["schemas"][schema], name, gives, name,
                         summary, more)
+        hooks += ["", "    def _%s(self, values: Mapping[Tuple[str, ...], Any]) -> %s:" % (name, gives),
+                  "        raise NotImplementedError"]
     signatures = set(re.findall(r"\w+", " ".join(
-        line for line in methods if line.startswith("            ") and ": Optional[" in line)))
+        line.partition(") ->")[0] for line in methods if ": Optional[" in line)))
     used = [name for name in types.names if name in signatures]
     head = HEAD % version
     return {
@@ -215,11 +217,11 @@ def generate(document):
         "_calls.py": head + (
             "from __future__ import annotations\n\n"
             "from typing import TYPE_CHECKING, Any, Iterator, List, Literal, Mapping, Optional, "
-            "Sequence, Union\n\nfrom ._types import (\n%s)\n\nif TYPE_CHECKING:\n"
+            "Sequence, Tuple, Union\n\nfrom ._types import (\n%s)\n\nif TYPE_CHECKING:\n"
             "    from .jobs import Job\n    from .pictures import Comparison, Picture\n\n\n"
             "class SceneCalls:\n"
             '    """Calls of a scene that take a request; Scene has what they do."""\n' % "".join(
-                "    %s,\n" % n for n in used)) + "\n".join(methods) + "\n"}
+                "    %s,\n" % n for n in used)) + "\n".join(methods + hooks) + "\n"}
 
 
 def write(document_path, folder):

@@ -12,6 +12,8 @@ from unittest import mock
 
 from wheel import TINY, client, demo, harness, penumbra
 
+from pictures import read_png  # beside the harness
+
 # Of many samples, in a picture of which none is there already.
 BETTER = {"technique": "multisample", "params": {"samples": 64}, "width": 160, "height": 120,
           "deadline_ms": 3600000}
@@ -251,7 +253,6 @@ class Client(unittest.TestCase):
 
     def test_numpy(self):
         picture = self.scene.render(**TINY)
-        exr = self.scene.render(**TINY, format="exr")
         with mock.patch.dict("sys.modules", {"numpy": None}):
             self.assertRaisesRegex(ImportError, "numpy", picture.numpy)
         try:
@@ -260,16 +261,23 @@ class Client(unittest.TestCase):
             return
         none = dict.fromkeys(("OpenImageIO", "OpenEXR", "imageio", "imageio.v3"))
         with mock.patch.dict("sys.modules", none):
-            self.assertRaisesRegex(ImportError, "pip install OpenEXR", exr.numpy)
-        for what, kind in ((picture, numpy.uint8), (exr, numpy.floating)):
+            self.assertRaisesRegex(ImportError, "pip install imageio", picture.numpy)
+        ground = [0.25, 0.5, 0.75]
+        albedo = self.scene.render(**TINY, layer="albedo", format="exr", ground_albedo=ground)
+        width, height, rows = read_png(picture.bytes)
+        for what in (picture, albedo):
             try:
                 pixels = what.numpy()
             except ImportError as error:
                 self.assertIn("pip install", str(error))
                 continue
-            self.assertEqual(pixels.shape[:2], (16, 24))
-            self.assertTrue(numpy.issubdtype(pixels.dtype, kind), pixels.dtype)
-            self.assertGreater(float(pixels.max()), 0)
+            self.assertEqual(pixels.shape[:2], (height, width))
+            if what is picture:
+                self.assertEqual(pixels.dtype, numpy.uint8)
+                self.assertEqual(pixels.tolist(), [[list(p) for p in row] for row in rows])
+            else:
+                self.assertTrue(numpy.issubdtype(pixels.dtype, numpy.floating), pixels.dtype)
+                self.assertLess(abs(pixels[:, :, :3] - ground).max(axis=2).min(), 1 / 255)
 
     # ---- comparisons ----
 

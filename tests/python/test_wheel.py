@@ -114,6 +114,40 @@ class Wheel(unittest.TestCase):
                     if not name.startswith("_") and callable(member):
                         self.assertTrue(member.__doc__, (thing, name))
 
+    def test_type_checker(self):
+        """What a checker of types finds in a user's program is what is wrong in it."""
+        program = textwrap.dedent("""\
+            from penumbra import Client, types
+            camera: types.Camera = {"orbit": {"azimuth_deg": 3.0}}
+            with Client("http://x") as client:
+                scene = client.upload("x.glb")
+                picture = scene.render(technique="pcss", width=3, camera=camera, format="exr",
+                                       lights=[{"type": "sun", "position": [0, 1, 0]}])
+                scene.render(technique={"name": "pcss", "params": {"filter_taps": 3}})
+                scene.render(technique="pcsss")  # wrong
+                scene.render(width="3")  # wrong
+                scene.render(lights=[{"type": "lamp"}])  # wrong
+                scene.render(widht=3)  # wrong
+                text: str = picture.bytes  # wrong
+                for frame in scene.sequence(frames=3).frames():
+                    number: int = frame.number
+                rmse: float = scene.compare(techniques="all")["pcss"]["rmse"]
+                scene.info["triangels"]  # wrong
+            """)
+        mypy = shutil.which("mypy")
+        if not mypy:
+            self.skipTest("no mypy")
+        path = os.path.join(self.folder, "program.py")
+        with open(path, "w", encoding="utf-8") as file:
+            file.write(program)
+        ran = subprocess.run([mypy, "--cache-dir", os.path.join(self.folder, "mypy"), path],
+                             capture_output=True, text=True,
+                             env={**os.environ, "MYPYPATH": wheel.FOLDER})
+        found = {int(n) for n in re.findall(r"program\.py:(\d+): error", ran.stdout)}
+        wanted = {n for n, line in enumerate(program.splitlines(), 1) if line.endswith("# wrong")}
+        self.assertEqual(found, wanted, ran.stdout + ran.stderr)
+        self.assertNotRegex(ran.stdout, r"penumbra/\w+\.py:\d+: error")
+
     # ---- the file ----
 
     def test_form(self):

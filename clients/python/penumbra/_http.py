@@ -9,7 +9,7 @@ import time
 import urllib.parse
 
 from ._types import VERSION
-from .errors import PenumbraError, Unreachable, make_problem
+from .errors import PenumbraError, Problem, Unreachable, make_problem
 
 FIRST_PAUSE_S, MOST_PAUSE_S = 0.25, 8.0
 # What a service or a proxy before it says when it cannot take a request now.
@@ -167,16 +167,17 @@ class Http:
         """Calls until it succeeds, as long as that makes sense; raises the last error."""
         end = time.monotonic() + self.retry_for
         for tries in range(self.retries + 1):
-            pause = min(MOST_PAUSE_S, FIRST_PAUSE_S * 2 ** tries) * random.uniform(0.5, 1.0)
+            pause = min(MOST_PAUSE_S, FIRST_PAUSE_S * 2.0 ** min(tries, 16)) * random.uniform(0.5, 1.0)
             try:
                 return call()
-            except PenumbraError as error:
-                status = getattr(error, "status", 0)
-                if status not in NOT_NOW or not error.retryable:
+            except Problem as error:
+                if error.status not in NOT_NOW or not error.retryable:
                     raise
                 if error.retry_after is not None:  # later than that: not all at once
                     pause += error.retry_after
                 failure = error
+            except PenumbraError:
+                raise
             except BROKEN as error:
                 failure = self.unreachable(error)
                 failure.__cause__ = error

@@ -32,7 +32,7 @@ class Job:
         self.info: "types.Job" = info
 
     @property
-    def id(self):
+    def id(self) -> str:
         return self.info["id"]
 
     @property
@@ -41,7 +41,7 @@ class Job:
         return self.info["state"]
 
     @property
-    def progress(self):
+    def progress(self) -> float:
         """From 0 to 1, when last heard of."""
         return self.info["progress"]
 
@@ -50,7 +50,7 @@ class Job:
                                            100 * self.progress)
 
     @property
-    def path(self):
+    def path(self) -> str:
         return "/v1/jobs/" + self.id
 
     def refresh(self) -> "Job":

@@ -1,6 +1,7 @@
 """Pictures and comparisons, as the service made them."""
 import os
 import tempfile
+from typing import Any, Dict, Iterator, List, Optional, Union
 
 from . import _types as types
 from .errors import PenumbraError
@@ -19,7 +20,8 @@ class Picture:
     final: False for those of progressive() that better ones follow.
     """
 
-    def __init__(self, data, kind, record=None, final=True):
+    def __init__(self, data: bytes, kind: str, record: "Optional[types.Record]" = None,
+                 final: bool = True):
         if kind not in TYPES:
             raise PenumbraError("the answer is no image but %s" % (kind or "of no type"))
         self.bytes, self.format, self.record, self.final = data, TYPES[kind], record, final
@@ -31,21 +33,21 @@ class Picture:
             len(self.bytes))
 
     @property
-    def warnings(self):
+    def warnings(self) -> List[str]:
         """What the method could not do, in words; [] without a record."""
         return list(self.record["warnings"]) if self.record else []
 
     @property
-    def timings(self) -> "types.StageTimes":
+    def timings(self) -> Dict[str, Optional[float]]:
         """Milliseconds per stage; {} without a record. Of each pass: record["passes"]."""
-        return dict(self.record["stages_ms"]) if self.record else {}
+        return {**self.record["stages_ms"]} if self.record else {}  # type: ignore
 
     @property
-    def request(self) -> "types.RenderRequest":
+    def request(self) -> Dict[str, Any]:
         """The request as the service completed it; {} without a record."""
-        return dict(self.record["request"]) if self.record else {}
+        return {**self.record["request"]} if self.record else {}
 
-    def save(self, path):
+    def save(self, path: "Union[str, os.PathLike[str]]") -> str:
         """Writes the file, whole or not at all. ValueError when its name ends like another
         format's. Returns the path."""
         path = os.fspath(path)
@@ -67,13 +69,13 @@ class Picture:
             raise
         return path
 
-    def _repr_png_(self):
+    def _repr_png_(self) -> Optional[bytes]:
         return self.bytes if self.format == "png" else None
 
-    def _repr_jpeg_(self):
+    def _repr_jpeg_(self) -> Optional[bytes]:
         return self.bytes if self.format == "jpeg" else None
 
-    def numpy(self):
+    def numpy(self) -> Any:
         """The pixels as a NumPy array, height x width x channels, as the file has them: uint8 or
         uint16 of PNG, JPEG, WebP and TIFF, floats (linear) of EXR. Needs NumPy, and one of
         OpenImageIO, imageio or, for EXR, OpenEXR that can read the format: ImportError without."""
@@ -87,7 +89,7 @@ class Picture:
 
 
 def read_openimageio(path, kind):
-    import OpenImageIO
+    import OpenImageIO  # type: ignore
     image = OpenImageIO.ImageInput.open(path)
     if image is None:
         raise ValueError(OpenImageIO.geterror())
@@ -99,7 +101,7 @@ def read_openimageio(path, kind):
 
 def read_openexr(path, kind):
     import numpy
-    import OpenEXR
+    import OpenEXR  # type: ignore
     if kind != "exr":
         raise ValueError("OpenEXR reads EXR only")
     with OpenEXR.File(path, separate_channels=True) as file:
@@ -109,8 +111,11 @@ def read_openexr(path, kind):
 
 
 def read_imageio(path, kind):
-    import imageio.v3
-    return imageio.v3.imread(path)
+    try:
+        import imageio.v3 as imageio  # type: ignore
+    except ImportError:  # before 2.16
+        import imageio  # type: ignore
+    return imageio.imread(path)
 
 
 def read_pixels(path, kind):
@@ -138,24 +143,24 @@ class Compared:
     def __init__(self, http_picture, row):
         self.row, self._picture = row, http_picture
 
-    def __getitem__(self, key):
+    def __getitem__(self, key: str) -> Any:
         return self.row[key]
 
-    def get(self, key, default=None):
+    def get(self, key: str, default: Any = None) -> Any:
         """The figure, or the default where this row has none."""
         return self.row.get(key, default)
 
     @property
-    def name(self):
+    def name(self) -> str:
         """The method's name."""
         return self.row["technique"]["name"]
 
     @property
-    def error(self):
+    def error(self) -> Optional[str]:
         """Why the method failed, in words, or None."""
         return self.row.get("error")
 
-    def picture(self, link="image"):
+    def picture(self, link: str = "image") -> Picture:
         """A picture of this row: "image", "difference" (white: equal, red: too light, blue: too
         dark), "ssim_map" or "flip_map". KeyError when it has none, NotFound when it is kept no
         more."""
@@ -175,17 +180,17 @@ class Comparison:
         self.rows = [Compared(http_picture, row) for row in document["methods"]]
 
     @property
-    def warnings(self):
+    def warnings(self) -> List[str]:
         """What could not be done, in words."""
         return list(self.document["warnings"])
 
-    def __iter__(self):
+    def __iter__(self) -> Iterator[Compared]:
         return iter(self.rows)
 
-    def __len__(self):
+    def __len__(self) -> int:
         return len(self.rows)
 
-    def __getitem__(self, which):
+    def __getitem__(self, which: Union[str, int]) -> Compared:
         if isinstance(which, str):
             for row in self.rows:
                 if row.name == which:

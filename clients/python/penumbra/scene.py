@@ -1,6 +1,7 @@
 """A stored scene, and what can be asked of it."""
 import json
 import secrets
+from typing import List
 
 from . import _types as types
 from ._calls import SceneCalls
@@ -47,12 +48,12 @@ class Scene(SceneCalls):
         self.info: "types.Scene" = info
 
     @property
-    def id(self):
+    def id(self) -> str:
         """The SHA-256 of its bytes, in hex."""
         return self.info["id"]
 
     @property
-    def warnings(self):
+    def warnings(self) -> List[str]:
         """What of the file is not shown as it says, in words."""
         return list(self.info["warnings"])
 

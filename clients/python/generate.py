@@ -204,7 +204,8 @@ def generate(document):
     for schema, name, gives, summary, more in CALLS:
         methods += call(types, document["components"]["schemas"][schema], name, gives, name,
                         summary, more)
-        hooks += ["", "    def _%s(self, values: Mapping[Tuple[str, ...], Any]) -> %s:" % (name, gives),
+        given = "Mapping[Tuple[str, ...], Any]"
+        hooks += ["", "    def _%s(self, values: %s) -> %s:" % (name, given, gives),
                   "        raise NotImplementedError"]
     signatures = set(re.findall(r"\w+", " ".join(
         line.partition(") ->")[0] for line in methods if ": Optional[" in line)))

@@ -205,6 +205,41 @@ class Again(unittest.TestCase):
         self.assertEqual(caught.exception.status, 413)
 
 
+class Broken(unittest.TestCase):
+    """Pictures that get better, from a server that breaks off or fails under way."""
+
+    def progressive(self, events, whole=True):
+        scene = (200, {}, {"id": "a" * 64, "triangles": 1})
+        picture = (200, {"Content-Type": "image/png"}, b"\x89PNG")
+        record = json.dumps({"image": {"href": "/v1/results/x"}})
+        text = "".join("event: %s\ndata: %s\n\n" % (kind, data or record)
+                       for kind, data in events).encode()
+        stream = (200, {"Content-Type": "text/event-stream", **(
+            {} if whole else {"Content-Length": len(text) + 100})}, text)
+        with Server(scene, stream, picture, keep=whole) as server, \
+                server.client(retries=0) as client:
+            got = []
+            try:
+                for picture in client.scene("a" * 64).progressive(width=3):
+                    got.append(picture.final)
+            except penumbra.PenumbraError as error:
+                return got, error
+            return got, None
+
+    def test_breaks_off(self):
+        for whole in (True, False):
+            got, error = self.progressive([("picture", ""), ("picture", "")], whole)
+            self.assertEqual((got, type(error)), ([False, False], penumbra.Unreachable))
+
+    def test_done(self):
+        self.assertEqual(self.progressive([("picture", ""), ("done", "")]), ([False, True], None))
+
+    def test_fails(self):
+        problem = json.dumps({"title": "Late", "status": 504, "detail": "", "retryable": True})
+        got, error = self.progressive([("picture", ""), ("problem", problem)])
+        self.assertEqual((got, type(error)), ([False], penumbra.DeadlinePassed))
+
+
 class Calls(unittest.TestCase):
     def test_pages(self):
         pages = [(200, {}, {"scenes": [{"id": c * 64} for c in page], "total": 3, **more})

@@ -3,6 +3,7 @@ import io
 import json
 import os
 import shutil
+import ssl
 import struct
 import tempfile
 import threading
@@ -12,7 +13,8 @@ from unittest import mock
 
 from wheel import TINY, client, demo, harness, penumbra
 
-from pictures import read_png  # beside the harness
+import test_wire  # beside the harness
+from pictures import read_png
 
 # Of many samples, in a picture of which none is there already.
 BETTER = {"technique": "multisample", "params": {"samples": 64}, "width": 160, "height": 120,
@@ -335,6 +337,19 @@ class Client(unittest.TestCase):
                     with self.assertRaises(penumbra.Denied) as caught:
                         call()
                     self.assertEqual(caught.exception.status, 401)
+
+    def test_tls(self):
+        certificate, key = test_wire.certificate(self.folder)
+        d = harness.Daemon("--tls-cert=" + certificate, "--tls-key=" + key)
+        self.addCleanup(d.kill)
+        context = ssl.create_default_context(cafile=certificate)
+        context.check_hostname = False  # it is of "localhost"
+        url = "https://127.0.0.1:%d" % d.port
+        with penumbra.Client(url, timeout=600, ssl_context=context) as trusting:
+            scene = trusting.upload(harness.grid_scene(2, "shared"))
+            self.assertEqual(scene.render(**TINY).bytes, self.scene.render(**TINY).bytes)
+        with penumbra.Client(url, timeout=600, retries=0) as careful:
+            self.assertRaisesRegex(penumbra.Unreachable, "(?i)certificate", careful.stats)
 
     def test_gone_and_back(self):
         with harness.socket.socket() as s:

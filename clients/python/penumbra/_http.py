@@ -114,13 +114,12 @@ class Http:
 
     def send(self, connection, method, link, body, headers, silence):
         """Sends a request and returns the response's head."""
-        # A whole float, because a socket refuses one that is too large.
-        connection.timeout = None if self.timeout is None else min(self.timeout + silence, 1e6)
-        if connection.sock is not None:
-            connection.sock.settimeout(connection.timeout)
-        else:
+        if connection.sock is None:
             connection.connect()
             connection.sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        # A socket refuses a time that is too long.
+        connection.sock.settimeout(
+            None if self.timeout is None else min(self.timeout + silence, 1e6))
         head = {"User-Agent": "penumbra-python/" + VERSION, "Accept": "application/json", **headers}
         if self.token:
             head["Authorization"] = "Bearer " + self.token
@@ -167,7 +166,8 @@ class Http:
         """Calls until it succeeds, as long as that makes sense; raises the last error."""
         end = time.monotonic() + self.retry_for
         for tries in range(self.retries + 1):
-            pause = min(MOST_PAUSE_S, FIRST_PAUSE_S * 2.0 ** min(tries, 16)) * random.uniform(0.5, 1.0)
+            pause = min(MOST_PAUSE_S, FIRST_PAUSE_S * 2.0 ** min(tries, 16))
+            pause *= random.uniform(0.5, 1.0)
             try:
                 return call()
             except Problem as error:

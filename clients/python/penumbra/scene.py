@@ -6,6 +6,7 @@ from typing import List
 from . import _types as types
 from ._calls import SceneCalls
 from ._events import parse
+from ._http import BROKEN
 from .errors import NotFound, PenumbraError, Unreachable, make_problem
 from .jobs import Job
 from .pictures import Comparison, Picture
@@ -120,9 +121,9 @@ class Scene(SceneCalls):
                     yield picture
                 if event.kind == "done":
                     return
-        except OSError as error:
-            if isinstance(error, PenumbraError):
-                raise
+        except PenumbraError:
+            raise
+        except BROKEN as error:
             raise self.client._http.unreachable(error) from error
         finally:
             close()

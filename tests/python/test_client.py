@@ -221,9 +221,10 @@ class Client(unittest.TestCase):
         self.assertRaises(TypeError, self.scene.render, widht=3)
         self.assertRaises(TypeError, self.scene.render, width={3})
         self.assertRaises(ValueError, self.scene.render, params={"taps": 3})
-        with self.d.paused():
-            self.assertRaises(penumbra.DeadlinePassed, self.scene.render, technique="hard",
-                              width=25, deadline_ms=300)
+        with self.d.paused(), client(self.d, retries=0) as hasty:
+            scene = hasty.scene(self.scene.id)  # too late, or known to become so
+            self.assertRaises((penumbra.DeadlinePassed, penumbra.Busy), scene.render,
+                              technique="hard", width=25, deadline_ms=300)
 
     def test_pictures_of_nobody_else(self):
         """Sessions and limited renders: no cache has them, and their record is theirs."""

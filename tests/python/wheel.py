@@ -13,7 +13,8 @@ SOURCE = os.path.join(HERE, "..", "..", "clients", "python")
 sys.path.insert(0, os.path.join(HERE, "..", "api"))
 import harness  # noqa: E402
 
-(PATH,) = glob.glob(os.path.join(harness.BIN, "..", "python", "*.whl"))
+# Builds of other versions may have left theirs.
+PATH = max(glob.glob(os.path.join(harness.BIN, "..", "python", "*.whl")), key=os.path.getmtime)
 FOLDER = tempfile.mkdtemp(prefix="penumbra-test-")
 atexit.register(shutil.rmtree, FOLDER, True)
 with zipfile.ZipFile(PATH) as archive:

@@ -1,6 +1,7 @@
 /**
- * `<penumbra-view server scene technique orbit>`: a rendered view for any page. A daemon serves it at
- * /penumbra-view.js; see docs/howto/view.md. What needs no document (Orbit, Pace, Latest) is exported.
+ * `<penumbra-view server scene technique orbit>`: a rendered view for any page. A daemon serves it
+ * at /penumbra-view.js; see docs/howto/view.md. What needs no document (Orbit, Pace, Latest) is
+ * exported.
  */
 import { Penumbra, PenumbraError } from "./penumbra.js";
 
@@ -59,7 +60,7 @@ export class Orbit {
   }
 }
 
-/** How small a picture has to be to take `budgetMs`: each level has half the pixels of the one before. */
+/** How small a picture has to be to take `budgetMs`: each level has half the pixels of the last. */
 export class Pace {
   constructor(budgetMs = 70, levels = 6) {
     Object.assign(this, { budgetMs, levels, level: 2 });
@@ -79,9 +80,9 @@ export class Pace {
 }
 
 /**
- * One answer at a time, and always to the newest question: what came between is never asked. A question
- * aborts the one under way, unless both are `brief`: those are let through to the end, or nothing would
- * be shown during a movement.
+ * One answer at a time, and always to the newest question: what came between is never asked. A
+ * question aborts the one under way, unless both are `brief`: those are let through to the end, or
+ * nothing would be shown during a movement.
  */
 export class Latest {
   #answer;
@@ -128,8 +129,8 @@ export class Latest {
 }
 
 const STYLE = `
-  :host { display: block; position: relative; overflow: hidden; aspect-ratio: 4 / 3; contain: content;
-    font: 13px/1.4 system-ui, sans-serif; background: #8881; }
+  :host { display: block; position: relative; overflow: hidden; aspect-ratio: 4 / 3;
+    contain: content; font: 13px/1.4 system-ui, sans-serif; background: #8881; }
   :host([hidden]) { display: none; }
   canvas { display: block; width: 100%; height: 100%; object-fit: contain; }
   :host([orbit]) canvas { cursor: grab; touch-action: none; }
@@ -300,7 +301,8 @@ export class PenumbraView extends Base {
     const ratio = Math.min(globalThis.devicePixelRatio || 1, 2);
     const scale = brief ? this.#pace.scale : 1;
     const side = (given, shown) => Math.max(1, Math.round((given ?? shown * ratio) * scale));
-    const request = { ...(this.lights ? {} : this.#held), ...this.request, width: side(this.width, this.clientWidth || 640),
+    const request = { ...(this.lights ? {} : this.#held), ...this.request,
+      width: side(this.width, this.clientWidth || 640),
       height: side(this.height, this.clientHeight || 480) };
     const name = this.technique, params = this.params;
     if (name) request.technique = params ? { name, params } : name;
@@ -362,7 +364,8 @@ export class PenumbraView extends Base {
         progress.style.transform = "scaleX(" + (of ? samples / of : 1) + ")";
         if (done) {
           this.#say("");
-          this.#tell("timing", { ms, stages: record.stages_ms, passes: record.passes, brief: false });
+          const { stages_ms: stages, passes } = record;
+          this.#tell("timing", { ms, stages, passes, brief: false });
         }
         this.#tell("load", { record, blob: picture.blob, warnings: record.warnings, done });
       }
@@ -417,7 +420,8 @@ export class PenumbraView extends Base {
   }
 
   #point(event) {
-    const { canvas } = this.#parts, pointers = this.#pointers, before = pointers.get(event.pointerId);
+    const { canvas } = this.#parts, pointers = this.#pointers;
+    const before = pointers.get(event.pointerId);
     const at = { x: event.clientX, y: event.clientY };
     if (event.type === "pointerdown" && this.#moves) {
       canvas.setPointerCapture(event.pointerId);

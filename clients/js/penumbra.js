@@ -1,6 +1,6 @@
 /**
- * The JavaScript client of penumbra: browsers and Node 18 or later, no dependency. A daemon serves it
- * at /penumbra.js. Types of requests and answers are those of its /openapi.json.
+ * The JavaScript client of penumbra: browsers and Node 18 or later, no dependency. A daemon serves
+ * it at /penumbra.js. Types of requests and answers are those of its /openapi.json.
  *
  * @typedef {import("./schemas").RenderRequest} RenderRequest
  * @typedef {import("./schemas").CompareRequest} CompareRequest
@@ -83,8 +83,8 @@ export class JobHandle {
   }
 
   /**
-   * What becomes of it until it is over: `state` events (data: the job) and `frame` events. When the
-   * connection breaks it goes on behind the last event.
+   * What becomes of it until it is over: `state` events (data: the job) and `frame` events. When
+   * the connection breaks it goes on behind the last event.
    * @param {Options & {after?: string}} options `after`: the id of the last event that is known.
    * @returns {AsyncGenerator<ServerEvent>}
    */
@@ -139,11 +139,11 @@ export class JobHandle {
 /** One daemon. */
 export class Penumbra {
   /**
-   * @param {string | URL} server Where it is, with the path it is offered under; left out: where this
-   *   module comes from.
-   * @param {{token?: string, retries?: number, fetch?: typeof fetch}} options `token`: bearer token.
-   *   `retries`: how often a request is sent again that was refused for now (429, 503) or that found
-   *   nobody; Retry-After is honoured. `fetch`: in place of the global one.
+   * @param {string | URL} server Where it is, with the path it is offered under; left out: where
+   *   this module comes from.
+   * @param {{token?: string, retries?: number, fetch?: typeof fetch}} options `token`: bearer
+   *   token. `retries`: how often a request is sent again that was refused for now (429, 503) or
+   *   that found nobody; Retry-After is honoured. `fetch`: in place of the global one.
    */
   constructor(server = new URL(".", import.meta.url), { token = "", retries = 4, fetch } = {}) {
     const base = new URL(server, globalThis.document?.baseURI);
@@ -291,8 +291,8 @@ export class Penumbra {
   }
 
   /**
-   * The full record of a render: the request as completed, warnings, times of every pass, and a link
-   * to the image that holds as long as it is kept.
+   * The full record of a render: the request as completed, warnings, times of every pass, and a
+   * link to the image that holds as long as it is kept.
    * @param {string} scene Id.
    * @param {RenderRequest} request
    * @param {Options} options
@@ -328,14 +328,17 @@ export class Penumbra {
           } catch (failure) { // a better one has taken its place
             if (!(failure instanceof PenumbraError && failure.status === 404)) throw failure;
           }
-          if (image)
+          if (image) {
             yield { record: data, done, picture: new Picture(await image.blob(), image.headers) };
-          else if (done)
-            yield { record: data, done, picture: await this.render(scene, request, { signal: both }) };
-        } else if (done) { // too large to be kept
-          yield { record: data, done, picture: await this.render(scene, request, { signal: both }) };
+            if (done) return;
+            continue;
+          }
         }
-        if (done) return;
+        if (!done) continue;
+        // Too large to be kept, or gone by now.
+        const picture = await this.render(scene, request, { signal: both });
+        yield { record: data, done, picture };
+        return;
       }
       throw new PenumbraError({ title: "The answer broke off.", status: 0, retryable: true });
     } catch (reason) {
@@ -373,7 +376,8 @@ export class Penumbra {
     const sequence = kind === "sequence";
     const answer = await this.#send(sequence ? "v1/jobs" : "v1/scenes/" + scene + "/" + kind,
       sequence ? { scene, ...request } : request, { signal },
-      { "Idempotency-Key": key || await makeKey(), ...(sequence ? {} : { Prefer: "respond-async" }) });
+      { "Idempotency-Key": key || await makeKey(),
+        ...(sequence ? {} : { Prefer: "respond-async" }) });
     return new JobHandle(this, await answer.json());
   }
 
@@ -401,8 +405,8 @@ export class Penumbra {
   }
 
   /**
-   * What the service counts, once a second, until the signal is aborted or the loop is left; it comes
-   * back when the service does.
+   * What the service counts, once a second, until the signal is aborted or the loop is left; it
+   * comes back when the service does.
    * @param {Options} options
    * @returns {AsyncGenerator<any>}
    */
@@ -413,8 +417,8 @@ export class Penumbra {
   /**
    * Server-sent events that go on, behind the last one, where a connection broke off.
    * @param {string} path
-   * @param {Options & {after?: string, forever?: boolean}} options `forever`: the stream's end is no
-   *   end, and a service that is away is waited for.
+   * @param {Options & {after?: string, forever?: boolean}} options `forever`: the stream's
+   *   end is no end, and a service that is away is waited for.
    * @returns {AsyncGenerator<ServerEvent>}
    */
   async *listen(path, { signal, after = "", forever = false } = {}) {
@@ -527,7 +531,8 @@ export async function* readEvents(/** @type {ReadableStream<Uint8Array> | null} 
       text = lines.pop() ?? "";
       for (const line of lines) {
         if (!line) {
-          if (data.length) yield { event: event || "message", id, data: JSON.parse(data.join("\n")) };
+          if (data.length)
+            yield { event: event || "message", id, data: JSON.parse(data.join("\n")) };
           event = "";
           data = [];
           continue;

@@ -83,7 +83,8 @@ def main():
     with open(sys.argv[2], "w", encoding="utf-8") as file:
         file.write(HEAD)
         for name, schema in schemas.items():
-            file.write("\n%sexport type %s = %s;\n" % (comment(schema, ""), name_of(name), type_of(schema)))
+            file.write("\n%sexport type %s = %s;\n" % (
+                comment(schema, ""), name_of(name), type_of(schema)))
 
 
 if __name__ == "__main__":

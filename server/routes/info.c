@@ -9,11 +9,13 @@
 #include <stdlib.h>
 #include <string.h>
 
-static bool answer_page(struct call *call, const char *text, size_t bytes)
+static bool answer_page(struct call *call, const char *text, size_t bytes, const char *scripts)
 {
     http_add_header(call->exchange, "Content-Security-Policy",
-        "default-src 'self'; style-src 'self' 'unsafe-inline'; script-src 'self' 'unsafe-inline'; "
-        "img-src 'self' blob:; frame-ancestors 'none'; base-uri 'none'");
+        "default-src 'self'; style-src 'self' 'unsafe-inline'; script-src %s; img-src 'self' "
+        "blob:; "
+        "form-action 'none'; frame-ancestors 'none'; base-uri 'none'",
+        scripts);
     http_add_header(call->exchange, "Cache-Control", "no-cache");
     http_answer(call->exchange, 200, "text/html; charset=utf-8", http_static(text, bytes));
     return true;
@@ -22,13 +24,14 @@ static bool answer_page(struct call *call, const char *text, size_t bytes)
 bool route_home(struct call *call, struct pen_error *error)
 {
     (void)error;
-    return answer_page(call, page_home, (size_t)(page_home_end - page_home));
+    return answer_page(call, page_home, (size_t)(page_home_end - page_home), "'self'");
 }
 
 bool route_docs(struct call *call, struct pen_error *error)
 {
     (void)error;
-    return answer_page(call, page_docs, (size_t)(page_docs_end - page_docs));
+    return answer_page(
+        call, page_docs, (size_t)(page_docs_end - page_docs), "'self' 'unsafe-inline'");
 }
 
 /* For pages of any origin that may call; asked for again each time, and sent when it is another. */
@@ -45,6 +48,12 @@ static bool answer_module(struct call *call, const char *text, size_t bytes)
         http_answer(
             call->exchange, 200, "text/javascript; charset=utf-8", http_static(text, bytes));
     return true;
+}
+
+bool route_home_module(struct call *call, struct pen_error *error)
+{
+    (void)error;
+    return answer_module(call, module_home, (size_t)(module_home_end - module_home));
 }
 
 bool route_client_module(struct call *call, struct pen_error *error)

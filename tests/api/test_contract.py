@@ -65,9 +65,10 @@ class Contract(unittest.TestCase):
             self.assertIn("Content-Security-Policy", page.headers)
 
     def test_modules(self):
-        for name in ("penumbra.js", "penumbra-view.js"):
+        for name, folder in (("penumbra.js", "clients/js"), ("penumbra-view.js", "clients/js"),
+                             ("home.js", "server/pages")):
             module = self.d.get("/" + name)
-            with open(os.path.join(os.path.dirname(__file__), "../../clients/js", name), "rb") as file:
+            with open(os.path.join(os.path.dirname(__file__), "../..", folder, name), "rb") as file:
                 self.assertEqual(module.body, file.read())
             again = self.d.get("/" + name, If_None_Match=module.headers["ETag"])
             self.assertEqual((again.status, again.body), (304, b""))

@@ -14,27 +14,7 @@ import unittest
 HERE = os.path.dirname(os.path.abspath(__file__))
 sys.path.insert(0, os.path.join(HERE, "../api"))
 from harness import Daemon, grid_scene  # noqa: E402
-
-INSTALL_S = 900
-
-
-def install(folder):
-    """What package.json asks for, once; False when that is not to be had."""
-    os.makedirs(folder, exist_ok=True)
-    with open(os.path.join(HERE, "package.json"), "rb") as file:
-        wanted = file.read()
-    stamp = os.path.join(folder, "installed.json")
-    if os.path.exists(stamp) and open(stamp, "rb").read() == wanted:
-        return True
-    shutil.copy(os.path.join(HERE, "package.json"), folder)
-    run = subprocess.run(["npm", "install", "--no-audit", "--no-fund", "--no-package-lock"],
-                         cwd=folder, timeout=INSTALL_S, check=False, capture_output=True)
-    if run.returncode:
-        print(run.stderr.decode()[-1500:])
-        return False
-    with open(stamp, "wb") as file:
-        file.write(wanted)
-    return True
+from tools import install  # noqa: E402
 
 
 class OpenApi(unittest.TestCase):

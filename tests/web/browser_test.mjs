@@ -1,0 +1,172 @@
+// The dashboard, and penumbra-view in a page of another origin, in Chromium.
+import assert from "node:assert/strict";
+import { createServer } from "node:http";
+import { createRequire } from "node:module";
+import { after, before, test } from "node:test";
+import { join } from "node:path";
+
+const { chromium } = createRequire(process.env.PACKAGES + "/")("playwright-core");
+const { DAEMON, SCENE, PICTURES } = process.env, PATIENCE_MS = 300000;
+let browser, server, page, problems, under, most, asked;
+
+const MARKUP = `<!doctype html><html lang="en"><title>other</title>
+<style>penumbra-view { width: 480px; height: 360px }</style>
+<script type="module" src="${DAEMON}/penumbra-view.js"></script>
+<penumbra-view server="${DAEMON}" scene="${SCENE}" technique="hard" orbit></penumbra-view></html>`;
+
+before(async () => {
+  browser = await chromium.launch({ executablePath: process.env.CHROMIUM,
+    args: ["--no-sandbox", "--disable-gpu"] });
+  server = createServer((request, response) => {
+    response.setHeader("Content-Type", "text/html");
+    response.setHeader("Content-Security-Policy",
+      `default-src 'none'; style-src 'unsafe-inline'; script-src ${DAEMON}; connect-src ${DAEMON}`);
+    response.end(MARKUP);
+  });
+  await new Promise(resolve => server.listen(0, "127.0.0.1", resolve));
+});
+
+after(async () => {
+  await browser?.close();
+  server.close();
+});
+
+/** Opens a page, counts its renders, and notes what goes wrong in it. */
+async function open(url, options = {}) {
+  await page?.context().close();
+  const context = await browser.newContext({ viewport: { width: 1280, height: 800 }, ...options });
+  page = await context.newPage();
+  page.setDefaultTimeout(PATIENCE_MS);
+  [problems, under, most, asked] = [[], new Set(), 0, []];
+  page.on("pageerror", reason => problems.push(String(reason)));
+  page.on("console", message => message.type() === "error" &&
+    !/ERR_INTERNET_DISCONNECTED|favicon/.test(message.text()) && problems.push(message.text()));
+  page.on("request", request => {
+    if (request.method() !== "POST" || !request.url().endsWith("/render")) return;
+    asked.push(request.postDataJSON());
+    under.add(request);
+    most = Math.max(most, under.size);
+  });
+  for (const kind of ["requestfinished", "requestfailed"])
+    page.on(kind, request => under.delete(request));
+  await page.addInitScript(() => {
+    globalThis.told = [];
+    for (const kind of ["load", "timing", "error", "camerachange"])
+      addEventListener(kind, ({ detail }) => detail && told.push({ kind, detail }), true);
+  });
+  await page.goto(url);
+}
+const other = options => open("http://127.0.0.1:" + server.address().port, options);
+
+/** Waits for the end of the next picture behind `from` events; gives its record's request. */
+async function loaded(from = 0) {
+  const told = await page.waitForFunction(from =>
+    globalThis.told.slice(from).find(t => t.kind === "load" && t.detail.done), from);
+  return told.evaluate(t => t.detail.record.request);
+}
+const failed = (from, again) => page.waitForFunction(([from, again]) => told.slice(from)
+  .some(t => t.kind === "error" && t.detail.again === again), [from, again]);
+const count = () => page.evaluate(() => told.length);
+const shown = () => page.evaluate(() => document.querySelector("penumbra-view").shadowRoot
+  .querySelector("canvas").toDataURL());
+const set = given => page.evaluate(given =>
+  void Object.assign(document.querySelector("penumbra-view"), given), given);
+
+test("two lines show a picture in a page of another origin, whose policy is strict", async () => {
+  await other();
+  const request = await loaded();
+  assert.deepEqual([request.width, request.height, request.technique.name], [480, 360, "hard"]);
+  const colours = await page.evaluate(() => {
+    const canvas = document.querySelector("penumbra-view").shadowRoot.querySelector("canvas");
+    const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+    return new Set(new Uint32Array(data.buffer)).size;
+  });
+  assert.ok(colours > 100);
+  assert.deepEqual(problems, []);
+});
+
+test("dragging turns it in small pictures, then comes the full one, lit the same", async () => {
+  const first = await loaded(), before = await shown(), from = await count();
+  await page.mouse.move(240, 180);
+  await page.mouse.down();
+  for (let step = 1; step <= 20; step++) await page.mouse.move(240 + 5 * step, 180);
+  await page.mouse.up();
+  const last = await loaded(from);
+  assert.notDeepEqual(last.camera.eye, first.camera.eye);
+  assert.deepEqual([last.lights, last.width], [first.lights, 480]);
+  const azimuth = ({ eye, target }) => Math.atan2(eye[0] - target[0], eye[2] - target[2]);
+  const turned = ((azimuth(first.camera) - azimuth(last.camera)) * 180 / Math.PI + 360) % 360;
+  assert.ok(Math.abs(turned - 180 * 100 / 360) < 0.1, turned + " degrees"); // 100 of 360 px
+  assert.ok(asked.some(request => request.width < 480));
+  assert.ok(most <= 2, most + " at once"); // one that is being aborted, and its successor
+  assert.notEqual(await shown(), before);
+});
+
+test("keys turn, and Home returns", async () => {
+  const home = await page.evaluate(() =>
+    told.find(t => t.kind === "load").detail.record.request.camera);
+  await page.locator("penumbra-view canvas").focus();
+  let from = await count();
+  await page.keyboard.press("ArrowLeft");
+  assert.notDeepEqual((await loaded(from)).camera.eye, home.eye);
+  from = await count();
+  await page.keyboard.press("Home");
+  const { eye } = (await loaded(from)).camera;
+  eye.forEach((value, axis) => assert.ok(Math.abs(value - home.eye[axis]) < 1e-4));
+});
+
+test("100 fast changes leave no request behind and end with the right picture", async () => {
+  const from = await count();
+  await page.evaluate(async () => {
+    const view = document.querySelector("penumbra-view");
+    for (let i = 0; i < 100; i++) {
+      view.technique = i === 99 ? "pcss" : i % 2 ? "hard" : "none";
+      await new Promise(resolve => setTimeout(resolve, 3));
+    }
+  });
+  await page.waitForFunction(from => told.slice(from).some(t =>
+    t.kind === "load" && t.detail.done && t.detail.record.request.technique.name === "pcss"), from);
+  await page.waitForTimeout(500);
+  const last = await page.evaluate(() => told.filter(t => t.kind === "load").at(-1).detail.record);
+  assert.equal(last.request.technique.name, "pcss");
+  assert.equal(under.size, 0);
+  assert.ok(most <= 2, most + " at once");
+});
+
+test("a service that goes away is said, and shown again when it is back", async () => {
+  let from = await count();
+  await page.context().setOffline(true);
+  await set({ technique: "hard" });
+  await failed(from, true);
+  assert.match(await page.locator("penumbra-view [part=status]").textContent(), /Trying again/);
+  from = await count();
+  await page.context().setOffline(false);
+  assert.equal((await loaded(from)).technique.name, "hard");
+  assert.equal(await page.locator("penumbra-view [part=status]").textContent(), "");
+});
+
+test("what the daemon refuses is said once", async () => {
+  const from = await count(), before = asked.length;
+  await set({ params: { nothing_like_it: 1 } });
+  await failed(from, false);
+  await page.waitForTimeout(1500);
+  assert.equal(asked.length, before + 1);
+  assert.match(await page.locator("penumbra-view [part=status]").textContent(), /nothing_like_it/);
+});
+
+for (const [name, options] of [["desktop", { colorScheme: "light" }],
+  ["dark", { colorScheme: "dark" }],
+  ["phone", { colorScheme: "dark", viewport: { width: 390, height: 844 }, hasTouch: true }]])
+  test("the dashboard, " + name, async () => {
+    await open(DAEMON + "/", options);
+    assert.equal((await loaded()).technique.name, "pcss");
+    await page.waitForFunction(() => [...document.images].every(image => image.complete));
+    assert.equal(await page.evaluate(() => document.documentElement.scrollWidth - innerWidth), 0);
+    await page.screenshot({ path: join(PICTURES, "dashboard-" + name + ".png") });
+    const from = await count();
+    await page.locator("#technique").selectOption("hard");
+    assert.equal((await loaded(from)).technique.name, "hard");
+    assert.match(page.url(), /technique=hard/);
+    assert.match(await page.locator("#curl").textContent(), /"name":"hard"/);
+    assert.deepEqual(problems, []);
+  });

@@ -1,0 +1,42 @@
+"""The dashboard and the element penumbra-view in Chromium, against a daemon.
+
+usage: test_browser.py FOLDER, where the packages of package.json are kept; pictures of the pages go
+to its folder pictures. Exits 77 (skipped) without Chromium, node, or the packages."""
+import os
+import shutil
+import subprocess
+import sys
+import unittest
+
+HERE = os.path.dirname(os.path.abspath(__file__))
+sys.path.insert(0, os.path.join(HERE, "../api"))
+from harness import BIN, PATIENCE, Daemon  # noqa: E402
+from tools import has_node, install, run_node  # noqa: E402
+
+
+class Browser(unittest.TestCase):
+    def test_browser(self):
+        d = Daemon("--cors-origin=*")
+        self.addCleanup(d.kill)
+        scene = os.path.join(d.folder, "demo.glb")
+        subprocess.run([os.path.join(BIN, "penumbra"), "generate", "demo", "-o", scene], check=True)
+        with open(scene, "rb") as file:
+            name = d.upload(file.read())
+        pictures = os.path.join(FOLDER, "pictures")
+        os.makedirs(pictures, exist_ok=True)
+        self.assertEqual(run_node(
+            "browser_test.mjs", 120 * PATIENCE, DAEMON="http://127.0.0.1:%d" % d.port, SCENE=name,
+            CHROMIUM=CHROMIUM, PACKAGES=FOLDER, PICTURES=pictures), 0)
+        self.assertEqual(d.stop(), 0)
+
+
+if __name__ == "__main__":
+    FOLDER = os.path.abspath(sys.argv.pop(1))
+    CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
+    if not CHROMIUM or not has_node() or not shutil.which("npm"):
+        print("skipped: no Chromium, or no node of version 18 or later with npm")
+        sys.exit(77)
+    if not install(FOLDER):
+        print("skipped: the packages cannot be installed")
+        sys.exit(77)
+    unittest.main(verbosity=2)

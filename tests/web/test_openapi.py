@@ -14,7 +14,7 @@ import unittest
 HERE = os.path.dirname(os.path.abspath(__file__))
 sys.path.insert(0, os.path.join(HERE, "../api"))
 from harness import Daemon, grid_scene  # noqa: E402
-from tools import install  # noqa: E402
+from tools import MODULES, install  # noqa: E402
 
 
 class OpenApi(unittest.TestCase):
@@ -44,7 +44,7 @@ class OpenApi(unittest.TestCase):
     def test_types_of_the_javascript_client(self):
         """Its comments are types that hold, and they are those of the document."""
         for name in ("penumbra.js", "types.py"):
-            shutil.copy(os.path.join(HERE, "../../clients/js", name), self.work)
+            shutil.copy(os.path.join(MODULES, name), self.work)
         shutil.copy(os.path.join(HERE, "typed_use.ts"), self.work)
         subprocess.run([sys.executable, "-B", "types.py", "openapi.json", "schemas.d.ts"],
                        cwd=self.work, check=True)

@@ -362,12 +362,10 @@ export class PenumbraView extends Base {
         this.#adopt(record.request);
         const ms = performance.now() - begun, { samples, of } = record.progress;
         progress.style.transform = "scaleX(" + (of ? samples / of : 1) + ")";
-        if (done) {
-          this.#say("");
-          const { stages_ms: stages, passes } = record;
-          this.#tell("timing", { ms, stages, passes, brief: false });
-        }
+        if (done) this.#say("");
         this.#tell("load", { record, blob: picture.blob, warnings: record.warnings, done });
+        const { stages_ms: stages, passes } = record;
+        if (done) this.#tell("timing", { ms, stages, passes, brief: false });
       }
     } finally {
       progress.classList.remove("on");

@@ -70,6 +70,8 @@ function takeLight() {
   const resize = light => ({ ...light, ...Object.fromEntries(
     ["width", "height", "radius", "angular_diameter_deg"].filter(key => key in light)
       .map(key => [key, light[key] * times])) });
+  text("times", "× " + times.toPrecision(2));
+  text("ev", step.toFixed(1) + " EV");
   view.lights = first && times !== 1 ? first.lights.map(resize) : null;
   view.request = { antialias: Number(at("antialias").value) || 1,
     output: { layer: at("layer").value || "beauty" },

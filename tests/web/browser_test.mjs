@@ -6,7 +6,7 @@ import { after, before, test } from "node:test";
 import { join } from "node:path";
 
 const { chromium } = createRequire(process.env.PACKAGES + "/")("playwright-core");
-const { DAEMON, SCENE, PICTURES } = process.env, PATIENCE_MS = 300000;
+const { DAEMON, SCENE, PICTURES } = process.env, PATIENCE_MS = Number(process.env.PATIENCE_MS);
 let browser, server, page, problems, under, most, asked;
 
 const MARKUP = `<!doctype html><html lang="en"><title>other</title>
@@ -39,8 +39,11 @@ async function open(url, options = {}) {
   page.setDefaultTimeout(PATIENCE_MS);
   [problems, under, most, asked] = [[], new Set(), 0, []];
   page.on("pageerror", reason => problems.push(String(reason)));
-  page.on("console", message => message.type() === "error" &&
-    !/ERR_INTERNET_DISCONNECTED|favicon/.test(message.text()) && problems.push(message.text()));
+  page.on("console", message => {
+    const said = message.text() + " " + message.location().url;
+    if (message.type() === "error" && !/ERR_INTERNET_DISCONNECTED|favicon/.test(said))
+      problems.push(said);
+  });
   page.on("request", request => {
     if (request.method() !== "POST" || !request.url().endsWith("/render")) return;
     asked.push(request.postDataJSON());
@@ -52,19 +55,26 @@ async function open(url, options = {}) {
   await page.addInitScript(() => {
     globalThis.told = [];
     for (const kind of ["load", "timing", "error", "camerachange"])
-      addEventListener(kind, ({ detail }) => detail && told.push({ kind, detail }), true);
+      document.addEventListener(kind, ({ detail }) => detail && told.push({ kind, detail }), true);
   });
   await page.goto(url);
 }
 const other = options => open("http://127.0.0.1:" + server.address().port, options);
 
-/** Waits for the end of the next picture behind `from` events; gives its record's request. */
-async function loaded(from = 0) {
-  const told = await page.waitForFunction(from =>
-    globalThis.told.slice(from).find(t => t.kind === "load" && t.detail.done), from);
-  return told.evaluate(t => t.detail.record.request);
+/** Waits until something is true in the page, whose policy lets nobody wait there. */
+async function until(condition, given) {
+  for (const end = Date.now() + PATIENCE_MS; Date.now() < end;) {
+    const value = await page.evaluate(condition, given);
+    if (value) return value;
+    await page.waitForTimeout(20);
+  }
+  throw new Error("waited in vain");
 }
-const failed = (from, again) => page.waitForFunction(([from, again]) => told.slice(from)
+
+/** The request of the next picture behind `from` events, once it is complete. */
+const loaded = (from = 0) => until(from => told.slice(from).find(t =>
+  t.kind === "load" && t.detail.done)?.detail.record.request, from);
+const failed = (from, again) => until(([from, again]) => told.slice(from)
   .some(t => t.kind === "error" && t.detail.again === again), [from, again]);
 const count = () => page.evaluate(() => told.length);
 const shown = () => page.evaluate(() => document.querySelector("penumbra-view").shadowRoot
@@ -124,7 +134,7 @@ test("100 fast changes leave no request behind and end with the right picture", 
       await new Promise(resolve => setTimeout(resolve, 3));
     }
   });
-  await page.waitForFunction(from => told.slice(from).some(t =>
+  await until(from => told.slice(from).some(t =>
     t.kind === "load" && t.detail.done && t.detail.record.request.technique.name === "pcss"), from);
   await page.waitForTimeout(500);
   const last = await page.evaluate(() => told.filter(t => t.kind === "load").at(-1).detail.record);
@@ -160,7 +170,7 @@ for (const [name, options] of [["desktop", { colorScheme: "light" }],
   test("the dashboard, " + name, async () => {
     await open(DAEMON + "/", options);
     assert.equal((await loaded()).technique.name, "pcss");
-    await page.waitForFunction(() => [...document.images].every(image => image.complete));
+    await until(() => [...document.images].every(image => image.complete));
     assert.equal(await page.evaluate(() => document.documentElement.scrollWidth - innerWidth), 0);
     await page.screenshot({ path: join(PICTURES, "dashboard-" + name + ".png") });
     const from = await count();

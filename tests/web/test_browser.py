@@ -26,7 +26,8 @@ class Browser(unittest.TestCase):
         os.makedirs(pictures, exist_ok=True)
         self.assertEqual(run_node(
             "browser_test.mjs", 120 * PATIENCE, DAEMON="http://127.0.0.1:%d" % d.port, SCENE=name,
-            CHROMIUM=CHROMIUM, PACKAGES=FOLDER, PICTURES=pictures), 0)
+            CHROMIUM=CHROMIUM, PATIENCE_MS=str(int(10000 * PATIENCE)), PACKAGES=FOLDER,
+            PICTURES=pictures), 0)
         self.assertEqual(d.stop(), 0)
 
 

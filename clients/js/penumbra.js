@@ -175,7 +175,7 @@ export class Penumbra {
         if (init.signal?.aborted) throw init.signal.reason;
         const { cause, message } = /** @type {any} */ (reason);
         failure = new PenumbraError({ title: "The service does not answer.", status: 0,
-          detail: "The service does not answer: " + (cause?.code ?? message), retryable: true });
+          detail: "The service does not answer (" + (cause?.code ?? message) + ").", retryable: true });
       }
       const later = [0, 429, 503].includes(failure.status) && failure.retryable;
       if (!later || tried >= this.retries) throw failure;

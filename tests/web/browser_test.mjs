@@ -148,7 +148,7 @@ test("a service that goes away is said, and shown again when it is back", async 
   await page.context().setOffline(true);
   await set({ technique: "hard" });
   await failed(from, true);
-  assert.match(await page.locator("penumbra-view [part=status]").textContent(), /Trying again/);
+  assert.match(await page.locator("penumbra-view [part=status]").textContent(), /does not answer.*\. Trying again\.$/);
   from = await count();
   await page.context().setOffline(false);
   assert.equal((await loaded(from)).technique.name, "hard");

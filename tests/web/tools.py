@@ -29,8 +29,12 @@ def install(folder):
     if os.path.exists(stamp) and open(stamp, "rb").read() == wanted:
         return True
     shutil.copy(os.path.join(HERE, "package.json"), folder)
-    run = subprocess.run(["npm", "install", "--no-audit", "--no-fund", "--no-package-lock"],
-                         cwd=folder, timeout=INSTALL_S, check=False, capture_output=True)
+    try:
+        run = subprocess.run(["npm", "install", "--no-audit", "--no-fund", "--no-package-lock",
+                              "--fetch-retries=1", "--fetch-timeout=60000"],
+                             cwd=folder, timeout=INSTALL_S, check=False, capture_output=True)
+    except subprocess.TimeoutExpired:
+        return False
     if run.returncode:
         print(run.stderr.decode()[-1500:])
         return False

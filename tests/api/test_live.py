@@ -55,12 +55,12 @@ class Live(unittest.TestCase):
         self.assertEqual(first["recent"], {"renders": 0})
         self.assertEqual(self.d.render(scene, SMALL).status, 200)
         self.assertEqual(self.d.render(scene, SMALL).status, 200)
-        while True:  # the next event, or the one after it
+        for _ in range(1000):  # those that were sent while it was drawn come first
             _, later = stream.event()
             self.assertGreater(later["unix_s"], first["unix_s"])
-            if later["recent"]["renders"] == 2:
+            if later["recent"]["renders"]:
                 break
-            self.assertLess(later["unix_s"], first["unix_s"] + 60)
+        self.assertIn(later["recent"]["renders"], (1, 2))  # the first may be longer ago
         times = later["recent"]["total"]
         self.assertTrue(0 < times["p50_ms"] <= times["p95_ms"] <= times["max_ms"])
         stream.close()

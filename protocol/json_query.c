@@ -1,5 +1,6 @@
 #include "protocol/json_reader.h"
 #include "protocol/json_request.h"
+#include "protocol/utf8.h"
 #include <stdio.h>
 #include <string.h>
 
@@ -64,6 +65,18 @@ static void expand(
     snprintf(path, MAX_PATH, "%s%s", prefix, key);
 }
 
+/* As in a body: what is taken can be written down and reads back the same. */
+static bool require_utf8(const struct pen_query_pair *pair, struct pen_error *error)
+{
+    if (!pen_is_utf8(pair->key, strlen(pair->key)))
+        return pen_fail(
+            error, PEN_MALFORMED, "", "A query key is not UTF-8: \"%.60s\".", pair->key);
+    if (pair->value && !pen_is_utf8(pair->value, strlen(pair->value)))
+        return pen_fail(error, PEN_MALFORMED, "",
+            "The value of the query key \"%.60s\" is not UTF-8.", pair->key);
+    return true;
+}
+
 static bool refuse_key(struct pen_error *error, const char *key)
 {
     return pen_fail(error, PEN_INVALID, "", "There is no query key \"%.60s\".", key);
@@ -126,6 +139,9 @@ bool pen_request_from_query(const struct pen_query_pair *pairs, uint32_t count,
 {
     if (count > MAX_PAIRS)
         return pen_fail(error, PEN_MALFORMED, "", "A query may have at most %d keys.", MAX_PAIRS);
+    for (uint32_t i = 0; i < count; i++)
+        if (!require_utf8(&pairs[i], error))
+            return false;
     for (uint32_t i = 0; i < count; i++) {
         if (strcmp(pairs[i].key, "request"))
             continue;

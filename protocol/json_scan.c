@@ -1,5 +1,6 @@
 #include "protocol/json_scan.h"
 #include "protocol/hex.h"
+#include "protocol/utf8.h"
 #include <assert.h>
 #include <string.h>
 
@@ -75,26 +76,6 @@ static bool scan_escape(struct scan *scan)
     return (unit >= 0xdc00 && unit <= 0xdfff) || fail_at(scan, "unpaired surrogate");
 }
 
-/* A multi-byte UTF-8 sequence: the code point is put together and must need that many bytes. */
-static bool scan_utf8(struct scan *scan)
-{
-    static const uint32_t smallest[] = {0, 0, 0x80, 0x800, 0x10000};
-    unsigned first = scan->text[scan->at];
-    unsigned length = first >= 0xf0 ? 4 : first >= 0xe0 ? 3 : 2;
-    if (first < 0xc0 || first > 0xf7)
-        return fail_at(scan, "not UTF-8");
-    uint32_t code = first & (0x7fu >> length);
-    for (unsigned i = 1; i < length; i++) {
-        if (scan->at + i >= scan->bytes || (scan->text[scan->at + i] & 0xc0) != 0x80)
-            return fail_at(scan, "not UTF-8");
-        code = code << 6 | (scan->text[scan->at + i] & 0x3f);
-    }
-    if (code < smallest[length] || code > 0x10ffff || (code >= 0xd800 && code <= 0xdfff))
-        return fail_at(scan, "not UTF-8");
-    scan->at += length;
-    return true;
-}
-
 static bool scan_string(struct scan *scan)
 {
     for (scan->at++;;) {
@@ -107,8 +88,11 @@ static bool scan_string(struct scan *scan)
             if (!scan_escape(scan))
                 return false;
         } else if (c >= 0x80) {
-            if (!scan_utf8(scan))
-                return false;
+            size_t length =
+                pen_utf8_length((const char *)scan->text + scan->at, scan->bytes - scan->at);
+            if (length == 0)
+                return fail_at(scan, "not UTF-8");
+            scan->at += length;
         } else {
             scan->at++;
             if (c == '"')

@@ -2,6 +2,7 @@
 #include "protocol/memory.h"
 #include "protocol/number.h"
 #include "protocol/request.h"
+#include "protocol/utf8.h"
 #include <assert.h>
 #include <math.h>
 #include <stdio.h>
@@ -21,43 +22,13 @@ static void put_text(struct pen_json *json, const char *text)
     put(json, text, strlen(text));
 }
 
-/* Bytes of the well-formed UTF-8 sequence at `s`, 0 when there is none (RFC 3629). */
-static size_t utf8_length(const unsigned char *s)
-{
-    if (s[0] < 0x80)
-        return 1;
-    unsigned low = 0x80, high = 0xbf;
-    size_t length;
-    if (s[0] >= 0xc2 && s[0] <= 0xdf)
-        length = 2;
-    else if (s[0] >= 0xe0 && s[0] <= 0xef) {
-        length = 3;
-        if (s[0] == 0xe0)
-            low = 0xa0; /* shorter forms exist */
-        else if (s[0] == 0xed)
-            high = 0x9f; /* surrogates */
-    } else if (s[0] >= 0xf0 && s[0] <= 0xf4) {
-        length = 4;
-        if (s[0] == 0xf0)
-            low = 0x90;
-        else if (s[0] == 0xf4)
-            high = 0x8f; /* above U+10FFFF */
-    } else
-        return 0;
-    if (s[1] < low || s[1] > high)
-        return 0;
-    for (size_t i = 2; i < length; i++)
-        if (s[i] < 0x80 || s[i] > 0xbf)
-            return 0;
-    return length;
-}
-
 static void put_quoted(struct pen_json *json, const char *text)
 {
     const unsigned char *s = (const unsigned char *)text;
+    size_t left = strlen(text);
     put(json, "\"", 1);
-    while (*s) {
-        size_t length = utf8_length(s);
+    while (left) {
+        size_t length = pen_utf8_length((const char *)s, left);
         char escape[8];
         if (length == 0) {
             put(json, "\xef\xbf\xbd", 3); /* U+FFFD */
@@ -74,6 +45,7 @@ static void put_quoted(struct pen_json *json, const char *text)
         } else
             put(json, (const char *)s, length);
         s += length;
+        left -= length;
     }
     put(json, "\"", 1);
 }

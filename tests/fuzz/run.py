@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
 """Runs every fuzzer of a build for so long, from its corpus.
 
-    run.py BUILD [--seconds 60] [--jobs 2] [--only NAME] [--grow]
+    run.py BUILD [--seconds 60] [--jobs 2] [--only NAME] [--seed 1] [--grow]
 
 BUILD is a tree of the preset `fuzz`; corpus/NAME.zip holds what a fuzzer begins from, and importers
-begin from the files of tests/api/hostile_files.py, too. What ends one stays in BUILD/fuzz-faults, and
+begin from the files of tests/api/hostile_files.py, too. A run's inputs follow from its seed (1, or
+--seed N; 0 takes another each time). What ends one stays in BUILD/fuzz-faults, and
 the command that repeats it is printed; the exit status is then 1. --grow writes what was found back
 into the corpora, as few inputs as cover the same.
 """
@@ -46,7 +47,8 @@ def fuzz(name, options, faults):
         if name in WRITERS:
             subprocess.run([sys.executable, "-B", WRITERS[name], "--seeds", start], check=True,
                            stdout=subprocess.DEVNULL)
-        common = [program, "-max_len=%d" % MOST_BYTES.get(name, 2048), "-rss_limit_mb=4096"]
+        common = [program, "-max_len=%d" % MOST_BYTES.get(name, 2048), "-rss_limit_mb=4096",
+                  "-seed=%d" % options.seed]
         command = common + ["-max_total_time=%d" % options.seconds, "-timeout=60", "-print_final_stats=1",
                             "-artifact_prefix=" + os.path.join(faults, name + "-")]
         if os.path.exists(dictionary):
@@ -91,6 +93,7 @@ def main():
     parser.add_argument("--seconds", type=int, default=60)
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     parser.add_argument("--only")
+    parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--grow", action="store_true")
     options = parser.parse_args()
     names = sorted(n[len("fuzz_"):] for n in os.listdir(os.path.join(options.build, "bin"))

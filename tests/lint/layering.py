@@ -6,7 +6,7 @@ import re
 import tree
 
 BASICS = ("container", "error", "fnv", "hex", "layer", "limits", "memory", "number", "param",
-          "request", "result", "srgb", "technique_info")
+          "request", "result", "srgb", "technique_info", "utf8")
 FLOOR_1 = ["protocol/%s.h" % name for name in BASICS] + ["protocol/*.def"]
 PURE = set("""assert ctype errno fenv float inttypes limits locale math stdalign stdarg stdatomic
     stdbool stddef stdint stdio stdlib string strings time""".split())

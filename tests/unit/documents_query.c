@@ -127,6 +127,17 @@ int main(void)
     refused("request=", PEN_MALFORMED, "", "empty");
     refused("camera.eye=1,2,3&camera.target=1,2,3", PEN_INVALID, "/camera", "differ");
 
+    /* A text that is no UTF-8 could not be written down and read back. */
+    static const char *const ill_formed[] = {"\x8d", "a\xc3", "\xc0\x80", "\xe0\x80\x80",
+        "\xed\xa0\x80", "\xf0\x8f\xbf\xbf", "\xf4\x90\x80\x80", "\xff", "\xc3("};
+    for (size_t i = 0; i < sizeof ill_formed / sizeof *ill_formed; i++) {
+        char query[80];
+        snprintf(query, sizeof query, "session=%s", ill_formed[i]);
+        refused(query, PEN_MALFORMED, "", "not UTF-8");
+        snprintf(query, sizeof query, "%s=1", ill_formed[i]);
+        refused(query, PEN_MALFORMED, "", "not UTF-8");
+    }
+
     char many[4000] = "a0=1";
     for (int i = 1; i < 290; i++)
         snprintf(many + strlen(many), sizeof many - strlen(many), "&a%d=1", i);

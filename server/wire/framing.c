@@ -275,28 +275,44 @@ static bool read_trailer(struct framing *f, char c, struct pen_error *error)
     return check_field(f->line, bytes, &name, &value, error);
 }
 
-int64_t framing_body(struct framing *f, const char *data, size_t bytes, struct pen_error *error)
+/* Of what stands between the chunks only their sizes and the last empty line are passed on. */
+static bool is_passed_on(const struct framing *f, enum framing_state state, char c)
 {
-    size_t i = 0;
+    if (state == FRAMING_TRAILER)
+        return c == '\n' ? f->state == FRAMING_OVER : c == '\r' && f->line_bytes == 1;
+    return state != FRAMING_CHUNK_LINE || !f->extension || c == '\r';
+}
+
+int64_t framing_body(
+    struct framing *f, char *data, size_t bytes, size_t *kept, struct pen_error *error)
+{
+    size_t i = 0, to = 0;
     while (i < bytes && f->state != FRAMING_OVER) {
-        if (f->state == FRAMING_LENGTH || f->state == FRAMING_CHUNK) {
+        enum framing_state state = f->state;
+        if (state == FRAMING_LENGTH || state == FRAMING_CHUNK) {
             uint64_t n = bytes - i < f->left ? bytes - i : f->left;
+            if (to < i)
+                memmove(data + to, data + i, n);
             i += n;
+            to += n;
             f->left -= n;
             if (!f->left)
-                f->state = f->state == FRAMING_LENGTH ? FRAMING_OVER : FRAMING_CHUNK_END;
+                f->state = state == FRAMING_LENGTH ? FRAMING_OVER : FRAMING_CHUNK_END;
             continue;
         }
         char c = data[i++];
-        if (f->state == FRAMING_CHUNK_END) {
+        if (state == FRAMING_CHUNK_END) {
             if (c != (f->cr ? '\n' : '\r'))
                 return malformed(error, "A chunk does not end where its size says."), -1;
             f->state = f->cr ? FRAMING_CHUNK_LINE : FRAMING_CHUNK_END;
             f->cr = !f->cr;
-        } else if (f->state == FRAMING_CHUNK_LINE ? !read_chunk_line(f, c, error)
-                                                  : !read_trailer(f, c, error)) {
+        } else if (state == FRAMING_CHUNK_LINE ? !read_chunk_line(f, c, error)
+                                               : !read_trailer(f, c, error)) {
             return -1;
         }
+        if (is_passed_on(f, state, c))
+            data[to++] = c;
     }
+    *kept = to;
     return (int64_t)i;
 }

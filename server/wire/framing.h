@@ -41,6 +41,8 @@ void framing_init(struct framing *framing);
  * PEN_HEADER_TOO_BIG. */
 int64_t framing_head(
     struct framing *framing, const char *text, size_t bytes, struct pen_error *error);
-/* How many of the bytes belong to the request's body, until the state is FRAMING_OVER; -1: an error. */
+/* How many of the bytes belong to the request's body, until the state is FRAMING_OVER; -1: an error. What
+ * of them is to be passed on is moved to the beginning of `data`, *kept bytes of it: not the extensions
+ * of chunks, nor the fields behind the last one, which nobody asked for. */
 int64_t framing_body(
-    struct framing *framing, const char *data, size_t bytes, struct pen_error *error);
+    struct framing *framing, char *data, size_t bytes, size_t *kept, struct pen_error *error);

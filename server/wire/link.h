@@ -26,6 +26,8 @@ struct link_config {
     int highest; /* descriptor that a request may have */
 };
 
+#define HTTP_CONTINUE "HTTP/1.1 100 Continue\r\n\r\n"
+
 /* One of a link's two sockets. */
 struct link_ear {
     struct link *link;
@@ -70,7 +72,7 @@ struct link {
     uint64_t since_ns, received; /* of the state, and of the body */
     uint64_t sending_ns, sent;   /* since when bytes wait for the client; 0: none do */
     uint64_t moved_ns;           /* when the last of them went */
-    bool served, answered, eof, eof_told, deaf, over;
+    bool served, answered, continued, eof, eof_told, deaf, over;
     uint32_t notes; /* atomic: enum link_note */
     /* The door's. */
     struct peer *peer;

@@ -299,6 +299,7 @@ class Wire(unittest.TestCase):
                         got, closed = talk(s, pieces if len(request) < 1000 else [request])
                     self.assertTrue(re.match(rb"HTTP/1\.[01] %d " % status, got), got[:300])
                     self.assertTrue(closed)
+                    self.assertEqual(got.count(b"HTTP/1.1 100 "), status == 100)
                     if status == 100:
                         self.assertIn(b"\r\n\r\nHTTP/1.1 200 ", got)
 

@@ -1,14 +1,23 @@
 /* The bytes of requests, in every division into pieces: the verdict is the same. */
 #include "server/wire/framing.h"
 #include "tests/unit/check.h"
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #define HEAD "POST /x HTTP/1.1\r\nHost: x\r\n"
 
+/* What of a body is passed on. */
+struct passed {
+    char bytes[256];
+    size_t count;
+};
+
 /* Reads a request whose bytes come in two pieces; 0 and what was read, or the error's code. */
-static uint32_t read_request(const char *text, size_t bytes, size_t cut, size_t *used)
+static uint32_t read_request(
+    const char *text, size_t bytes, size_t cut, size_t *used, struct passed *passed)
 {
+    passed->count = 0;
     struct framing framing;
     struct pen_error error = {0};
     framing_init(&framing);
@@ -23,7 +32,11 @@ static uint32_t read_request(const char *text, size_t bytes, size_t cut, size_t 
             at = n > 0 ? (size_t)n : 0;
         }
         if (framing.state != FRAMING_HEAD && error.code == PEN_OK) {
-            int64_t n = framing_body(&framing, exact + at, have - at, &error);
+            size_t kept = 0;
+            int64_t n = framing_body(&framing, exact + at, have - at, &kept, &error);
+            CHECK(n < 0 || kept <= (size_t)n);
+            for (size_t i = 0; n > 0 && i < kept && passed->count < sizeof passed->bytes; i++)
+                passed->bytes[passed->count++] = exact[at + i];
             at += n > 0 ? (size_t)n : 0;
         }
         free(exact);
@@ -36,10 +49,25 @@ static uint32_t read_request(const char *text, size_t bytes, size_t cut, size_t 
 
 static void check(const char *text, size_t bytes, uint32_t code, size_t end)
 {
+    struct passed passed;
     for (size_t cut = 0; cut <= bytes; cut++) {
         size_t used = 0;
-        CHECK(read_request(text, bytes, cut, &used) == code);
+        CHECK(read_request(text, bytes, cut, &used, &passed) == code);
         CHECK(code || used == end);
+    }
+}
+
+/* Of a body of chunks: extensions and the fields behind it are left out, and nothing else is. */
+static void check_passed(const char *body, const char *expected)
+{
+    char text[512];
+    struct passed passed;
+    size_t used, bytes = (size_t)snprintf(text, sizeof text,
+                     HEAD "Transfer-Encoding: chunked\r\n\r\n%s%s", body, "GET /");
+    for (size_t cut = 0; cut <= bytes; cut++) {
+        CHECK(read_request(text, bytes, cut, &used, &passed) == 0);
+        CHECK(used == bytes - 5);
+        CHECK(passed.count == strlen(expected) && !memcmp(passed.bytes, expected, passed.count));
     }
 }
 
@@ -65,6 +93,11 @@ int main(void)
     BAD(HEAD "Transfer-Encoding: chunked\r\n\r\n000000003\r\nabc\r\n0\r\n\r\n", PEN_MALFORMED);
     BAD(HEAD "Transfer-Encoding: chunked\r\n\r\n3\r\nabcd\r\n0\r\n\r\n", PEN_MALFORMED);
     BAD(HEAD "Transfer-Encoding: chunked\r\n\r\n0\r\nX : y\r\n\r\n", PEN_MALFORMED);
+    check_passed("3\r\nabc\r\n0\r\n\r\n", "3\r\nabc\r\n0\r\n\r\n");
+    check_passed("3;a=\"b;c\"\r\na;b\r\n00 ; x\r\n\r\n", "3\r\na;b\r\n00\r\n\r\n");
+    check_passed("2\t\r\n\r\n\r\nA;b\r\n0123456789\r\n0\r\nX: y\r\nZ:\r\n\r\n",
+        "2\r\n\r\n\r\nA\r\n0123456789\r\n0\r\n\r\n");
+    check_passed("0;x\r\nA: 3;b\r\n\r\n", "0\r\n\r\n");
     /* Kept open or not. */
     const struct {
         const char *text;
@@ -89,9 +122,10 @@ int main(void)
     memset(endless, 'a', bytes);
     memcpy(endless, "GET /", sizeof "GET /" - 1);
     size_t used;
-    CHECK(read_request(endless, bytes, 100, &used) == PEN_URI_TOO_LONG);
+    struct passed passed;
+    CHECK(read_request(endless, bytes, 100, &used, &passed) == PEN_URI_TOO_LONG);
     memcpy(endless, HEAD "A: ", sizeof HEAD - 1 + 3);
-    CHECK(read_request(endless, bytes, 100, &used) == PEN_HEADER_TOO_BIG);
+    CHECK(read_request(endless, bytes, 100, &used, &passed) == PEN_HEADER_TOO_BIG);
     free(endless);
     CHECK_DONE();
 }

@@ -153,7 +153,7 @@ bool pen_request_from_query(const struct pen_query_pair *pairs, uint32_t count,
     }
     const struct pen_technique_info *info = find_technique(pairs, count, catalogue);
     cJSON *root = cJSON_CreateObject();
-    bool ok = root != NULL || pen_fail(error, PEN_INTERNAL, "", "Out of memory.");
+    bool ok = root != NULL || pen_fail(error, PEN_UNAVAILABLE, "", "Out of memory.");
     /* The method first: an unknown one must not be reported as unknown parameters. */
     for (uint32_t n = 0; ok && n < 2 * count; n++) {
         uint32_t i = n % count;

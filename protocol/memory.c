@@ -1,6 +1,20 @@
 #include "protocol/memory.h"
 #include <stdlib.h>
 
+static int exit_status; /* 0: abort */
+
+void pen_memory_exit(int status)
+{
+    exit_status = status;
+}
+
+static void give_up(void)
+{
+    if (exit_status)
+        _Exit(exit_status);
+    abort();
+}
+
 void *pen_alloc(size_t count, size_t item_bytes)
 {
     return pen_realloc_array(NULL, count, item_bytes);
@@ -10,7 +24,7 @@ void *pen_alloc_zero(size_t count, size_t item_bytes)
 {
     void *memory = count && item_bytes ? calloc(count, item_bytes) : calloc(1, 1);
     if (!memory)
-        abort();
+        give_up();
     return memory;
 }
 
@@ -19,7 +33,7 @@ void *pen_realloc_array(void *memory, size_t count, size_t item_bytes)
     void *moved =
         count && item_bytes ? reallocarray(memory, count, item_bytes) : realloc(memory, 1);
     if (!moved)
-        abort();
+        give_up();
     return moved;
 }
 

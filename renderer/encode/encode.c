@@ -98,7 +98,8 @@ static bool encode_described(const struct pen_frame *frame, const struct pen_out
 {
     char *text = describe(attributes, attribute_count);
     if (!text)
-        return pen_fail(error, PEN_INTERNAL, "", "The image could not be encoded: out of memory.");
+        return pen_fail(
+            error, PEN_UNAVAILABLE, "", "The image could not be encoded: out of memory.");
     bool ok = output->format == PEN_TIFF ? tiff_encode(frame, bits_of(output), text, bytes, error)
                                          : jpeg_encode(frame, output->quality, text, bytes, error);
     free(text);

@@ -53,11 +53,13 @@ bool jpeg_encode(const struct pen_frame *frame, uint32_t quality, const char *de
             channels == 1 ? TJPF_GRAY : TJPF_RGB, &jpeg, &size,
             channels == 1 ? TJSAMP_GRAY : TJSAMP_420, (int)quality, TJFLAG_ACCURATEDCT) == 0;
     if (!done)
-        pen_fail(error, PEN_INTERNAL, "", "The JPEG file could not be encoded: %s.",
+        pen_fail(error, pixels && encoder ? PEN_INTERNAL : PEN_UNAVAILABLE, "",
+            "The JPEG file could not be encoded: %s.",
             pixels && encoder ? tjGetErrorStr2(encoder) : "out of memory");
     else if (!write_with_comment(
                  jpeg, size, description, length < MOST_COMMENT ? length : MOST_COMMENT, &file))
-        done = pen_fail(error, PEN_INTERNAL, "", "The JPEG file could not be kept: out of memory.");
+        done =
+            pen_fail(error, PEN_UNAVAILABLE, "", "The JPEG file could not be kept: out of memory.");
     tjFree(jpeg);
     if (encoder)
         tjDestroy(encoder);

@@ -219,7 +219,7 @@ bool png_fast_encode(const struct pen_frame *frame, uint32_t bit_depth,
     chunk_end(&out, chunk_begin(&out, "IEND"));
     if (!ok || out.failed) {
         free(out.data);
-        return pen_fail(error, PEN_INTERNAL, "", "The PNG could not be encoded: out of memory.");
+        return pen_fail(error, PEN_UNAVAILABLE, "", "The PNG could not be encoded: out of memory.");
     }
     *bytes = (struct pen_bytes){out.data, out.size};
     return true;

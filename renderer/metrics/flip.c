@@ -176,7 +176,7 @@ bool pen_metrics_flip(const struct pen_metrics_image *test,
         return pen_fail(error, PEN_INVALID, "", "There must be 4 to 1000 pixels per degree.");
     double *next = f.memory = malloc(13 * f.pixels * sizeof *f.memory), sum = 0;
     if (!f.memory)
-        return pen_fail(error, PEN_INTERNAL, "", "Out of memory.");
+        return pen_fail(error, PEN_UNAVAILABLE, "", "Out of memory.");
     for (int i = 0; i < 2; i++) {
         for (int c = 0; c < 3; c++, next += f.pixels)
             f.seen[i][c] = next;

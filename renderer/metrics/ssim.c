@@ -26,7 +26,7 @@ bool pen_metrics_ssim(const struct pen_metrics_image *test,
     size_t pixels = (size_t)width * height, counted = 0;
     double *planes = malloc(PLANES * pixels * sizeof *planes), *plane[PLANES];
     if (!planes)
-        return pen_fail(error, PEN_INTERNAL, "", "Out of memory.");
+        return pen_fail(error, PEN_UNAVAILABLE, "", "Out of memory.");
     for (int i = 0; i < PLANES; i++)
         plane[i] = planes + (size_t)i * pixels;
     for (int k = -RADIUS; k <= RADIUS; k++)

@@ -236,7 +236,7 @@ bool pen_bvh_build(const struct pen_bvh_triangle *triangles, uint32_t count, str
     if (!items || !bvh->nodes || !bvh->triangles) {
         free(items);
         pen_bvh_finish(bvh);
-        return pen_fail(error, PEN_INTERNAL, "", "Out of memory.");
+        return pen_fail(error, PEN_UNAVAILABLE, "", "Out of memory.");
     }
     for (uint32_t i = 0; i < count; i++) {
         const struct pen_bvh_triangle *t = &triangles[i];
@@ -310,7 +310,7 @@ bool pen_bvh_build_scene(const struct psc_scene *scene, uint64_t max_triangles, 
     uint8_t *casters = trace_casters(scene);
     *bvh = (struct pen_bvh){0};
     if (!casters)
-        return pen_fail(error, PEN_INTERNAL, "", "Out of memory.");
+        return pen_fail(error, PEN_UNAVAILABLE, "", "Out of memory.");
     for (uint32_t i = 0; i < scene->instance_count; i++) {
         uint32_t number = scene->instances[i].primitive;
         if (casters[number] != TRACE_CASTS_NOTHING)
@@ -324,7 +324,7 @@ bool pen_bvh_build_scene(const struct psc_scene *scene, uint64_t max_triangles, 
             "The scene has %llu triangles; %llu can be ray traced.", (unsigned long long)count,
             (unsigned long long)limit);
     if (!triangles)
-        return pen_fail(error, PEN_INTERNAL, "", "Out of memory.");
+        return pen_fail(error, PEN_UNAVAILABLE, "", "Out of memory.");
     bool ok = pen_bvh_build(triangles, (uint32_t)count, bvh, error);
     free(triangles);
     return ok;

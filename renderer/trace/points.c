@@ -29,7 +29,7 @@ bool trace_points_make(
     uint32_t block = samples > TRACE_FIRST_BLOCK ? TRACE_FIRST_BLOCK : samples;
     uint32_t early = TRACE_PRETEST_FIRST, late = TRACE_PRETEST_NET - early;
     if (!xs)
-        return pen_fail(error, PEN_INTERNAL, "", "Out of memory.");
+        return pen_fail(error, PEN_UNAVAILABLE, "", "Out of memory.");
     *p = (struct trace_points){.u = (int32_t *)xs,
         .v = (int32_t *)ys,
         .samples = samples,
@@ -47,7 +47,7 @@ bool trace_points_make(
     }
     if (!ok) {
         trace_points_finish(p);
-        return pen_fail(error, PEN_INTERNAL, "", "Out of memory.");
+        return pen_fail(error, PEN_UNAVAILABLE, "", "Out of memory.");
     }
     for (uint32_t i = 0; i < rim; i++) { /* from [0,1) to [-1,1) */
         xs[i] ^= 0x80000000u;

@@ -26,7 +26,7 @@ enum worker_exit {
     WORKER_EXIT_REFUSED = 2, /* it has said why */
     WORKER_EXIT_LOST,        /* the context is lost */
     WORKER_EXIT_PROTOCOL,    /* the daemon is gone, or talks nonsense */
-    WORKER_EXIT_MEMORY,      /* the device has no memory left */
+    WORKER_EXIT_MEMORY,      /* no memory is left, of the device's or the machine's */
     WORKER_EXIT_OTHERS       /* the context is lost by another program's fault */
 };
 

@@ -331,6 +331,7 @@ int main(int argc, char **argv)
     }
     if (what == WORKER_WARM_UP_FILL || what == WORKER_WARM_UP_FILL_NOW)
         return fill_cache(&config, what == WORKER_WARM_UP_FILL);
+    pen_memory_exit(WORKER_EXIT_MEMORY);
     static struct channel_message hello;
     struct pen_error error = {0};
     uint64_t start = clock_now_ns();

@@ -20,7 +20,7 @@
 #define WANTED_EVERY_MS 10 /* how often it is asked whether anybody still waits for what runs */
 #define MAX_KILLS 2        /* of one render, by its own fault */
 #define STARVED_RETRY_S 10
-#define MAX_STARVED 2  /* of one render, when the device has no memory left */
+#define MAX_STARVED 2  /* of one render, when memory runs out */
 #define MAX_ATTEMPTS 6 /* of one render, when somebody else ends the workers */
 #define QUIT_MS 3000
 #define MAX_BACKOFF_MS 5000
@@ -167,9 +167,8 @@ static void survive(struct slot *slot, struct flight *flight, bool guilty, enum 
         worker_slot_finish(slot, flight, &outcome);
     } else if (starved) {
         pen_fail(&outcome.error, PEN_UNAVAILABLE, "",
-            "The device ran out of memory twice while this was rendered; other programs may hold "
-            "it, "
-            "or --gpu-memory is more than it has.");
+            "Memory ran out twice while this was rendered, the device's or the machine's; other "
+            "programs may hold it, or --gpu-memory is more than there is.");
         outcome.error.retry_after_s = STARVED_RETRY_S;
         worker_slot_finish(slot, flight, &outcome);
     } else if (give_up) {
@@ -210,7 +209,7 @@ static enum death find_cause(int status, bool hung)
 static const char *death_text(int status, enum death death, char *text, size_t bytes)
 {
     if (death == DEATH_MEMORY)
-        return "ended: the device has no memory left";
+        return "ended: no memory is left to it or the device";
     if (death == DEATH_OUTSIDE && WIFEXITED(status))
         return "ended: another program made the device reset";
     return process_describe(status, text, bytes);

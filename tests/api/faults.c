@@ -2,11 +2,13 @@
  * connections, OpenGL and the time of day fail when a test says so.
  *
  * PENUMBRA_FAULTS names a file of `struct control`, which the test changes while they run. A count n > 0:
- * the n-th call from now on fails; n < 0: all do; 0: none does. */
+ * the n-th call from now on fails; n < 0: all do; 0: none does. `own`: of allocations only those count that
+ * the program's own code asks for, none of a library's. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <errno.h>
 #include <fcntl.h>
+#include <link.h>
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -23,7 +25,7 @@
 struct control {
     struct process_faults {
         int32_t allocations, writes, write_errno, accepts, gl_errors, gl_code, gl_reset, clock_s,
-            hits, unused[7];
+            hits, own, unused[6];
     } processes[3];
 };
 static const char *const names[3] = {"penumbrad", "penumbra-worker", "penumbra-import"};
@@ -31,8 +33,24 @@ static const char *const names[3] = {"penumbrad", "penumbra-worker", "penumbra-i
 #define IMPORT_OUTPUT_FD 4 /* renderer/import/import_process.h */
 static struct process_faults *faults, *faults_of_importer;
 
+static uintptr_t code[2]; /* of the program */
+
+static int find_code(struct dl_phdr_info *object, size_t bytes, void *context)
+{
+    (void)bytes, (void)context;
+    for (int i = 0; i < object->dlpi_phnum; i++) {
+        const ElfW(Phdr) *part = &object->dlpi_phdr[i];
+        if (part->p_type != PT_LOAD || !(part->p_flags & PF_X))
+            continue;
+        code[0] = object->dlpi_addr + part->p_vaddr;
+        code[1] = code[0] + part->p_memsz;
+    }
+    return 1; /* the first is the program */
+}
+
 __attribute__((constructor)) static void attach(void)
 {
+    dl_iterate_phdr(find_code, NULL);
     const char *path = getenv("PENUMBRA_FAULTS");
     int fd = path ? open(path, O_RDWR | O_CLOEXEC) : -1;
     struct control *control =
@@ -67,8 +85,11 @@ void *__libc_malloc(size_t bytes);
 void *__libc_calloc(size_t count, size_t bytes);
 void *__libc_realloc(void *old, size_t bytes);
 
-static int fails_to_allocate(void)
+static int fails_to_allocate(const void *caller)
 {
+    uintptr_t at = (uintptr_t)caller;
+    if (faults && faults->own && (at < code[0] || at >= code[1]))
+        return 0;
     if (!STRIKES(allocations))
         return 0;
     errno = ENOMEM;
@@ -77,17 +98,17 @@ static int fails_to_allocate(void)
 
 void *malloc(size_t bytes)
 {
-    return fails_to_allocate() ? NULL : __libc_malloc(bytes);
+    return fails_to_allocate(__builtin_return_address(0)) ? NULL : __libc_malloc(bytes);
 }
 
 void *calloc(size_t count, size_t bytes)
 {
-    return fails_to_allocate() ? NULL : __libc_calloc(count, bytes);
+    return fails_to_allocate(__builtin_return_address(0)) ? NULL : __libc_calloc(count, bytes);
 }
 
 void *realloc(void *old, size_t bytes)
 {
-    return fails_to_allocate() ? NULL : __libc_realloc(old, bytes);
+    return fails_to_allocate(__builtin_return_address(0)) ? NULL : __libc_realloc(old, bytes);
 }
 
 /* ---- files ---- */

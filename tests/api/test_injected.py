@@ -14,7 +14,7 @@ from harness import SMALL, Daemon, grid_scene, main, wait
 # struct control of faults.c
 DAEMON, WORKER, IMPORTER = range(3)
 FIELDS = ("allocations", "writes", "write_errno", "accepts", "gl_errors", "gl_code", "gl_reset",
-          "clock_s", "hits")
+          "clock_s", "hits", "own")
 SIZE = 16 * 4
 LIBRARY = os.path.join(os.environ.get("PENUMBRA_BIN", ""), "libpenumbra_faults.so")
 OUT_OF_MEMORY, CONTEXT_LOST = 0x0505, 0x0507
@@ -77,7 +77,7 @@ class Injected(unittest.TestCase):
             struck = self.faults.read(WORKER, "gl_errors") == 0
             self.assertTrue(struck or n > 1)
             self.assertEqual(self.d.metric("penumbra_worker_out_of_memory_total"), before + struck)
-        self.assertIn("the device has no memory left", self.d.log())
+        self.assertIn("no memory is left to it or the device", self.d.log())
         # Again and again: it is not to be had now, but it is nobody's fault.
         self.faults.set(WORKER, gl_errors=-1)
         answer = self.d.render(scene, LARGE)
@@ -240,19 +240,26 @@ class Injected(unittest.TestCase):
         self.assertEqual(self.post(self.data).status, 201)
 
     def test_worker_s_memory(self):
-        """One allocation that fails ends the worker at worst; the picture comes all the same."""
+        """One of its allocations that fails ends the worker at worst; the picture comes all the same.
+        (What a driver makes of a failed allocation of its own it does not always say.)"""
         scene = self.d.upload(self.data)
         expected = self.d.render(scene, SMALL).body
         hits = 0
-        for n in (1, 3, 10, 30, 100, 300, 1000, 3000):
+        for n in (1, 2, 3, 5, 8, 13, 21, 34, 55, 89, 3000):
             self.d.worker()
-            self.faults.set(WORKER, allocations=n)
+            self.faults.set(WORKER, own=1, allocations=n)
             answer = self.d.render(scene, SMALL)
             hits += self.faults.read(WORKER, "hits")
             self.faults.none()
+            if answer.status == 503:  # what asks for a size that a client names says so instead
+                self.check_problem(answer, 503)
+                self.assertIn("memory", answer.json()["detail"])
+                self.assertGreater(int(answer.headers["Retry-After"]), 0)
+                answer = self.d.render(scene, SMALL)
             self.assertEqual((answer.status, answer.body == expected), (200, True),
                              answer.body[:300])
         self.assertGreater(hits, 3)
+        self.check_innocent()
 
     def test_descriptors(self):
         """accept fails for want of descriptors: who waits is served when there are some."""

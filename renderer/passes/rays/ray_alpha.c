@@ -73,7 +73,7 @@ static bool make_words(const struct psc_scene *scene, uint64_t max_bytes, struct
 {
     uint64_t *places = calloc(scene->image_count + 1, sizeof *places);
     if (!places)
-        return pen_fail(error, PEN_INTERNAL, "", "Out of memory.");
+        return pen_fail(error, PEN_UNAVAILABLE, "", "Out of memory.");
     uint64_t texels = place_images(scene, (uint64_t)4 * WORDS * scene->material_count, places);
     alpha->word_count = texels / 4 + 1;
     bool fits = texels < NO_TEXELS && 4 * alpha->word_count <= max_bytes;
@@ -87,7 +87,7 @@ static bool make_words(const struct psc_scene *scene, uint64_t max_bytes, struct
     if (!fits)
         return pen_fail(error, PEN_TOO_BIG, "/scene",
             "The scene's alpha textures are too large to be ray traced on this GPU.");
-    return alpha->words || pen_fail(error, PEN_INTERNAL, "", "Out of memory.");
+    return alpha->words || pen_fail(error, PEN_UNAVAILABLE, "", "Out of memory.");
 }
 
 static void fill_triangle(
@@ -131,7 +131,7 @@ bool ray_alpha_make(const struct psc_scene *scene, struct pen_bvh *bvh, uint64_t
     *alpha = (struct ray_alpha){0};
     uint32_t *first = calloc(scene->instance_count + 1, sizeof *first);
     if (!first)
-        return pen_fail(error, PEN_INTERNAL, "", "Out of memory.");
+        return pen_fail(error, PEN_UNAVAILABLE, "", "Out of memory.");
     alpha->triangle_count = number_records(scene, bvh, first);
     uint64_t bytes = (uint64_t)alpha->triangle_count * sizeof *alpha->triangles;
     bool ok = bytes <= max_bytes ||
@@ -140,7 +140,7 @@ bool ray_alpha_make(const struct psc_scene *scene, struct pen_bvh *bvh, uint64_t
     if (ok && alpha->triangle_count) {
         alpha->triangles = malloc(bytes);
         ok = alpha->triangles ? make_words(scene, max_bytes, alpha, error)
-                              : pen_fail(error, PEN_INTERNAL, "", "Out of memory.");
+                              : pen_fail(error, PEN_UNAVAILABLE, "", "Out of memory.");
     }
     for (uint32_t i = 0; ok && i < bvh->triangle_count; i++) {
         struct pen_bvh_triangle *t = &bvh->triangles[i];

@@ -127,7 +127,7 @@ static bool upload_points(struct work *w, struct pen_error *error)
     const struct trace_points *p = &w->points;
     int32_t(*pairs)[2] = malloc(p->total * sizeof *pairs);
     if (!pairs)
-        return pen_fail(error, PEN_INTERNAL, "", "Out of memory.");
+        return pen_fail(error, PEN_UNAVAILABLE, "", "Out of memory.");
     for (uint32_t i = 0; i < p->total; i++) {
         pairs[i][0] = p->u[i];
         pairs[i][1] = p->v[i];

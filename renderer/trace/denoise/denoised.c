@@ -43,7 +43,7 @@ static bool make_more_points(struct denoise *d, struct pen_error *error)
     uint32_t n = d->refine, bits = 0;
     uint32_t *u = (uint32_t *)d->more_points, *v = u + n;
     if (!trace_samples_net(0, n, ~d->job->seed, u, v))
-        return pen_fail(error, PEN_INTERNAL, "", "Out of memory.");
+        return pen_fail(error, PEN_UNAVAILABLE, "", "Out of memory.");
     for (uint32_t i = 0; i < 2 * n; i++)
         u[i] ^= 0x80000000u;
     while ((2u << bits) <= n)
@@ -138,7 +138,7 @@ static bool run_stages(struct denoise *d, struct pen_error *error)
     if (!trace_in_pieces(p, d->tiles, denoise_pretest))
         goto late;
     if (!find_work(d))
-        return pen_fail(error, PEN_INTERNAL, "", "Out of memory.");
+        return pen_fail(error, PEN_UNAVAILABLE, "", "Out of memory.");
     if (!trace_in_pieces(p, d->tiles, denoise_sample) ||
         !trace_in_pieces(p, d->tiles, denoise_plan))
         goto late;
@@ -213,7 +213,7 @@ bool pen_trace_denoised(struct pen_trace_scene *scene, const struct pen_trace_li
     size_t bytes = lay_out(&d, NULL);
     room = trace_scratch_take(scene, &bytes);
     if (!room) {
-        pen_fail(error, PEN_INTERNAL, "", "Out of memory.");
+        pen_fail(error, PEN_UNAVAILABLE, "", "Out of memory.");
         goto fail;
     }
     lay_out(&d, room);

@@ -24,7 +24,7 @@ bool trace_emitter_average(const struct trace_emitter *e, float mean[3], struct 
     uint32_t *xs = malloc(2 * (size_t)POINTS * sizeof *xs), *ys = xs ? xs + POINTS : NULL;
     if (!xs || !trace_samples_net(0, POINTS, 0, xs, ys)) {
         free(xs);
-        return pen_fail(error, PEN_INTERNAL, "", "Out of memory.");
+        return pen_fail(error, PEN_UNAVAILABLE, "", "Out of memory.");
     }
     for (uint32_t i = 0; i < POINTS; i++) {
         float u = (float)xs[i] * 0x1p-31f - 1, v = (float)ys[i] * 0x1p-31f - 1, rgb[3];

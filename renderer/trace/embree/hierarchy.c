@@ -104,7 +104,7 @@ static bool cull(struct pen_trace_scene *scene, struct trace_hierarchy *h,
     h->indices[TRACE_GEOMETRY_ALPHA] = leaves;
     h->alpha_triangles = malloc((alpha + 1) * sizeof *h->alpha_triangles);
     if (!front || !mixed || !leaves || !h->alpha_triangles)
-        return pen_fail(error, PEN_INTERNAL, "", "Out of memory.");
+        return pen_fail(error, PEN_UNAVAILABLE, "", "Out of memory.");
     h->bytes = (uint64_t)facing * 24 + (uint64_t)alpha * 16;
     atomic_fetch_add(&scene->bytes, (int64_t)h->bytes);
     for (uint32_t i = 0; i < facing; i++) {

@@ -93,14 +93,14 @@ static bool plan_all(struct build *b, struct pen_error *error)
     alpha->images = calloc(blob->image_count + 1, sizeof *alpha->images);
     alpha->image_count = blob->image_count;
     if (!b->plans || !alpha->table || !alpha->images)
-        return pen_fail(error, PEN_INTERNAL, "", "Out of memory.");
+        return pen_fail(error, PEN_UNAVAILABLE, "", "Out of memory.");
     uint8_t *casters = trace_casters(blob);
     bool planned = casters != NULL;
     for (uint32_t i = 0; planned && i < blob->primitive_count; i++)
         planned = plan_primitive(b, i, casters[i]);
     free(casters);
     if (!planned)
-        return pen_fail(error, PEN_INTERNAL, "", "Out of memory.");
+        return pen_fail(error, PEN_UNAVAILABLE, "", "Out of memory.");
     for (uint32_t i = 0; i < blob->instance_count; i++) {
         const struct psc_primitive *p = &blob->primitives[blob->instances[i].primitive];
         uint32_t group = b->plans[blob->instances[i].primitive];
@@ -134,7 +134,7 @@ static bool allocate(struct build *b, struct pen_error *error)
         out->positions[g] = calloc(b->vertices[g] + 1, sizeof *out->positions[g]);
         out->indices[g] = calloc(b->triangles[g] + 1, sizeof *out->indices[g]);
         if (!out->ranges[g] || !out->positions[g] || !out->indices[g])
-            return pen_fail(error, PEN_INTERNAL, "", "Out of memory.");
+            return pen_fail(error, PEN_UNAVAILABLE, "", "Out of memory.");
     }
     struct trace_alpha *alpha = &out->alpha;
     uint64_t triangles = b->triangles[TRACE_ALPHA], vertices = b->vertices[TRACE_ALPHA];
@@ -143,7 +143,7 @@ static bool allocate(struct build *b, struct pen_error *error)
     alpha->vertex_alpha = calloc(vertices + 1, sizeof *alpha->vertex_alpha);
     alpha->materials = calloc(triangles + 1, sizeof *alpha->materials);
     if (!alpha->uv || !alpha->vertex_alpha || !alpha->materials)
-        return pen_fail(error, PEN_INTERNAL, "", "Out of memory.");
+        return pen_fail(error, PEN_UNAVAILABLE, "", "Out of memory.");
     return true;
 }
 
@@ -219,7 +219,7 @@ struct pen_trace_scene *pen_trace_scene_create(const struct psc_scene *blob,
     struct pen_trace_scene *out = calloc(1, sizeof *out);
     struct build build = {.blob = blob, .out = out};
     if (!out) {
-        pen_fail(error, PEN_INTERNAL, "", "Out of memory.");
+        pen_fail(error, PEN_UNAVAILABLE, "", "Out of memory.");
         return NULL;
     }
     out->max_bytes = options && options->max_bytes ? options->max_bytes : DEFAULT_MAX_BYTES;

@@ -391,15 +391,15 @@ static bool select_receivers(struct run *run, struct pen_error *error)
     bool early = run->job->step && run->mode == TRACE_COUNT_ONLY;
     run->kept.verdicts = calloc(count, 1);
     if (early && !(run->early = calloc(count, 1)))
-        return pen_fail(error, PEN_INTERNAL, "", "Out of memory.");
+        return pen_fail(error, PEN_UNAVAILABLE, "", "Out of memory.");
     if (early &&
         (!over_tiles(run, early_tile) || !look_up(run, TRACE_PRETEST_FIRST) || run->enough))
         return true;
     run->kept.full = calloc(count, 1);
     if (!run->kept.verdicts || !run->kept.full)
-        return pen_fail(error, PEN_INTERNAL, "", "Out of memory.");
+        return pen_fail(error, PEN_UNAVAILABLE, "", "Out of memory.");
     if (over_tiles(run, pretest_tile) && !spread(run))
-        return pen_fail(error, PEN_INTERNAL, "", "Out of memory.");
+        return pen_fail(error, PEN_UNAVAILABLE, "", "Out of memory.");
     if (over_tiles(run, settle_tile) && early)
         look_up(run, TRACE_PRETEST_NET);
     return true;

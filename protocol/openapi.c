@@ -110,6 +110,9 @@ static void write_content(struct pen_json *json, enum pen_body body)
     case PEN_BODY_LIVE:
         write_events(json, live_events);
         break;
+    case PEN_BODY_THUMBNAIL:
+        write_media(json, pen_format_mime[PEN_JPEG], NULL);
+        break;
     case PEN_BODY_PAGE:
         write_media(json, "text/html", NULL);
         break;
@@ -253,7 +256,7 @@ static void write_parameters(
     struct pen_json *json, const struct pen_route *route, const struct pen_catalogue *catalogue)
 {
     static const char *const placeholders[][3] = {
-        {"{id}", "id", "{\"$ref\":\"" SCHEMA "Id\"}"},
+        {"{id}", "id", "{\"$ref\":\"" SCHEMA "IdPrefix\"}"},
         {"{name}", "name", "{\"$ref\":\"" SCHEMA "TechniqueName\"}"},
         {"{number}", "number", "{\"type\":\"integer\",\"minimum\":0}"},
     };
@@ -276,6 +279,14 @@ static void write_parameters(
             "{\"name\":\"after\",\"in\":\"query\",\"description\":\"The last "
             "id of the page before.\",\"schema\":{\"$ref\":\"" SCHEMA "Id\"}}");
     }
+    if (route->flags & PEN_ROUTE_LABELS) {
+        pen_json_raw(json, NULL,
+            "{\"name\":\"name\",\"in\":\"query\",\"description\":\"Only those whose name has this "
+            "in it, whatever its case.\",\"schema\":{\"type\":\"string\"}}");
+        pen_json_raw(json, NULL,
+            "{\"name\":\"tag\",\"in\":\"query\",\"description\":\"Only those with this "
+            "tag.\",\"schema\":{\"type\":\"string\"}}");
+    }
     if (route->flags & PEN_ROUTE_STATES)
         pen_json_raw(json, NULL,
             "{\"name\":\"state\",\"in\":\"query\",\"schema\":{\"$ref\":\"" SCHEMA "JobState\"}}");
@@ -290,12 +301,17 @@ static void write_parameters(
             "{\"name\":\"Idempotency-Key\",\"in\":\"header\",\"description\":\"1 to 255 "
             "characters of your own. The same request with it again makes no second job; another "
             "one is refused with 422.\",\"schema\":{\"type\":\"string\"}}");
-    if (route->flags & PEN_ROUTE_ENTRY)
+    if (route->flags & PEN_ROUTE_ENTRY) {
+        pen_json_raw(json, NULL,
+            "{\"name\":\"name\",\"in\":\"query\",\"description\":\"What the scene is to be called; "
+            "else as its file, where that is said. A scene that has a name keeps it.\",\"schema\":{"
+            "\"type\":\"string\"}}");
         pen_json_raw(json, NULL,
             "{\"name\":\"entry\",\"in\":\"query\",\"description\":\"The .glb or .gltf that is "
             "wanted, where a zip or a form holds several. The id is then the SHA-256 of "
             "PENENTR1, the entry's length in 4 bytes from the lowest, 4 zero bytes, the entry "
             "and the upload's own bytes.\",\"schema\":{\"type\":\"string\"}}");
+    }
     if (route->flags & PEN_ROUTE_QUERY)
         write_request_queries(json, catalogue);
     pen_json_end(json);

@@ -26,10 +26,13 @@ static bool capture(
     const char *placeholder, const char *token, size_t bytes, struct pen_route_match *match)
 {
     if (!strncmp(placeholder, "{id}", 4)) {
-        char text[PEN_ID_HEX + 1] = "";
-        if (bytes != PEN_ID_HEX)
+        char text[PEN_ID_HEX + 1];
+        if (bytes < PEN_ID_PREFIX || bytes > PEN_ID_HEX)
             return false;
+        memset(text, '0', PEN_ID_HEX);
+        text[PEN_ID_HEX] = 0;
         memcpy(text, token, bytes);
+        match->id_digits = (uint32_t)bytes;
         return pen_id_from_hex(text, match->id);
     }
     if (!strncmp(placeholder, "{number}", 8)) {

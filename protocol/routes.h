@@ -21,14 +21,15 @@ enum pen_body {
 #undef DERIVED
     PEN_BODY_SCENE_UPLOAD,
     PEN_BODY_IMAGE_UPLOAD,
-    PEN_BODY_PICTURE,  /* an image */
-    PEN_BODY_RENDERED, /* a rendered image, its record, or either as it gets better */
-    PEN_BODY_PAGE,     /* HTML */
-    PEN_BODY_MODULE,   /* JavaScript */
-    PEN_BODY_EVENTS,   /* what becomes of a job */
-    PEN_BODY_LIVE,     /* what the service counts */
-    PEN_BODY_FRAME,    /* an image, or the request that gives it */
-    PEN_BODY_RESULT,   /* all that a job gives */
+    PEN_BODY_PICTURE,   /* an image */
+    PEN_BODY_RENDERED,  /* a rendered image, its record, or either as it gets better */
+    PEN_BODY_THUMBNAIL, /* a small JPEG */
+    PEN_BODY_PAGE,      /* HTML */
+    PEN_BODY_MODULE,    /* JavaScript */
+    PEN_BODY_EVENTS,    /* what becomes of a job */
+    PEN_BODY_LIVE,      /* what the service counts */
+    PEN_BODY_FRAME,     /* an image, or the request that gives it */
+    PEN_BODY_RESULT,    /* all that a job gives */
 };
 /* The media types of an upload, ended by NULL; NULL: the body is no upload. */
 const char *const *pen_upload_types(enum pen_body body);
@@ -39,7 +40,7 @@ enum pen_route_flags {
     PEN_ROUTE_PAGED = 4,       /* takes limit and after */
     PEN_ROUTE_CONDITIONAL = 8, /* ETag and If-None-Match */
     PEN_ROUTE_OPEN = 16,       /* asks for no token */
-    PEN_ROUTE_ENTRY = 32,      /* takes entry, the scene that is wanted of several */
+    PEN_ROUTE_ENTRY = 32,      /* takes entry, the scene that is wanted of several, and its name */
     PEN_ROUTE_NAMED = 64,      /* a scene file's name may follow, which says nothing more */
     PEN_ROUTE_ASYNC = 128,     /* Prefer: respond-async makes it a job */
     PEN_ROUTE_JOB = 256,       /* always makes a job */
@@ -47,12 +48,14 @@ enum pen_route_flags {
     PEN_ROUTE_REMOVES = 1024,  /* 204 where nothing is left of it */
     PEN_ROUTE_STATES = 2048,   /* takes state */
     PEN_ROUTE_KEYED = 4096,    /* takes Idempotency-Key */
+    PEN_ROUTE_LABELS = 8192,   /* takes name and tag, of what is wanted */
 };
 
 struct pen_route {
-    uint32_t id;         /* enum pen_route_id; the row's index */
-    const char *method;  /* "GET" also serves HEAD */
-    const char *pattern; /* "{id}" is 64 lower-case hexadecimal digits, "{name}" a method's name,
+    uint32_t id;        /* enum pen_route_id; the row's index */
+    const char *method; /* "GET" also serves HEAD */
+    const char *
+        pattern; /* "{id}" is an id or at least its first PEN_ID_PREFIX digits, "{name}" a method's name,
                             "{number}" a whole number */
     const char *operation;
     const char *summary;
@@ -63,7 +66,8 @@ extern const struct pen_route pen_routes[PEN_ROUTES];
 
 struct pen_route_match {
     const struct pen_route *route;       /* NULL: none */
-    uint8_t id[PEN_ID_BYTES];            /* what stood for {id} */
+    uint8_t id[PEN_ID_BYTES];            /* what stood for {id}, zeros behind its digits */
+    uint32_t id_digits;                  /* how many it had; PEN_ID_HEX: all */
     char name[PEN_TECHNIQUE_NAME_BYTES]; /* what stood for {name}, or "" */
     uint32_t number;                     /* what stood for {number} */
     uint64_t methods;                    /* bit r: row r has this path, whatever its method */

@@ -348,6 +348,7 @@ struct service *service_create(
         !(s->store = scene_store_open(config->store, config->store_limit.bytes, error)) ||
         (s->auth && !open_owners(s, error)))
         goto fail;
+    s->labels = labels_open(s->store);
     struct scheduler_limits limits = {.queue = (uint32_t)config->queue_limit,
         .client_share = (uint32_t)config->client_share,
         .workers = (uint32_t)config->workers,
@@ -429,6 +430,7 @@ void service_destroy(struct service *s, const bool *hurry)
     result_cache_destroy(s->cache);
     result_cache_destroy(s->part_cache);
     metrics_destroy(s->metrics);
+    labels_close(s->labels);
     scene_store_close(s->store);
     if (s->canary_blob >= 0)
         close(s->canary_blob);

@@ -8,6 +8,7 @@
  * @typedef {import("./schemas").Comparison} Comparison
  * @typedef {import("./schemas").Record} RenderRecord
  * @typedef {import("./schemas").Scene} Scene
+ * @typedef {import("./schemas").SceneChanges} SceneChanges
  * @typedef {import("./schemas").ImageInfo} ImageInfo
  * @typedef {import("./schemas").Service} Service
  * @typedef {import("./schemas").Stats} Stats
@@ -228,11 +229,12 @@ export class Penumbra {
 
   /**
    * The stored scenes, asked for page by page.
-   * @param {Options} options
+   * @param {Options & {name?: string, tag?: string}} options `name`: only those whose name has it
+   *   in it, whatever its case; `tag`: only those that have it.
    * @returns {AsyncGenerator<Scene>}
    */
-  async *scenes({ signal } = {}) {
-    for (let path = "v1/scenes?limit=100"; path;) {
+  async *scenes({ signal, name, tag } = {}) {
+    for (let path = "v1/scenes" + queryOf({ limit: "100", name, tag }); path;) {
       const page = await this.json(path, { signal });
       yield* page.scenes;
       path = page.next;
@@ -241,12 +243,36 @@ export class Penumbra {
 
   /**
    * What a scene holds.
-   * @param {string} id
+   * @param {string} id Here and wherever an id is taken: all of it, or at least six of its first
+   *   digits that no other begins with.
    * @param {Options} options
    * @returns {Promise<Scene>}
    */
   scene(id, { signal } = {}) {
     return this.json("v1/scenes/" + id, { signal });
+  }
+
+  /**
+   * Changes what a scene is called.
+   * @param {string} id
+   * @param {SceneChanges} changes `name`, `tags`; null: it has none any more.
+   * @param {Options} options
+   * @returns {Promise<Scene>}
+   */
+  changeScene(id, changes, { signal } = {}) {
+    return this.json("v1/scenes/" + id, { method: "PATCH", signal, body: JSON.stringify(changes),
+      headers: { "Content-Type": "application/json" } });
+  }
+
+  /**
+   * A small picture of a scene (JPEG), which the service makes once and keeps.
+   * @param {string} id
+   * @param {Options} options
+   * @returns {Promise<Picture>}
+   */
+  async thumbnail(id, { signal } = {}) {
+    const answer = await this.call("v1/scenes/" + id + "/thumbnail", { signal });
+    return new Picture(await answer.blob(), answer.headers);
   }
 
   /**
@@ -261,11 +287,12 @@ export class Penumbra {
    * Stores a scene; the same bytes again give the same id.
    * @param {Bytes | Iterable<File>} data A .glb or zip; or the files of a .gltf, by their names, or
    *   by their paths where a folder was chosen or dropped.
-   * @param {Options & {entry?: string}} options `entry`: the scene that is wanted of several.
+   * @param {Options & {entry?: string, name?: string}} options `entry`: the scene that is wanted
+   *   of several. `name`: what it is to be called; else as its file.
    * @returns {Promise<Scene>}
    */
-  upload(data, { signal, entry } = {}) {
-    const path = "v1/scenes" + (entry ? "?entry=" + encodeURIComponent(entry) : "");
+  upload(data, { signal, entry, name } = {}) {
+    const path = "v1/scenes" + queryOf({ entry, name: name || entry || nameOf(data) });
     return this.json(path, { method: "POST", signal, ...uploadBody(data) });
   }
 
@@ -493,6 +520,22 @@ function anySignal(/** @type {(AbortSignal | undefined)[]} */ ...signals) {
       { once: true, signal: controller.signal });
   }
   return controller.signal;
+}
+
+/** @returns {string} "?" and those that have a value, or "". */
+function queryOf(/** @type {Record<string, string | undefined>} */ keys) {
+  const given = Object.entries(keys).filter(([, value]) => value);
+  const query = new URLSearchParams(/** @type {[string, string][]} */ (given));
+  return given.length ? "?" + query : "";
+}
+
+/** @returns {string | undefined} What the file is called that the scene is. */
+function nameOf(/** @type {Bytes | Iterable<File>} */ data) {
+  if (Symbol.iterator in Object(data) && !ArrayBuffer.isView(data)) {
+    const files = [.../** @type {Iterable<File>} */ (data)];
+    return (files.find(file => /\.gltf$/i.test(file.name)) ?? files[0])?.name;
+  }
+  return /** @type {File} */ (data).name;
 }
 
 async function makeKey() {

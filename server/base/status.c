@@ -27,6 +27,7 @@ struct http_status http_status_of(enum pen_code code)
         ROW(TIMEOUT, 408, "Request Timeout", true);
         ROW(METHOD_NOT_ALLOWED, 405, "Method Not Allowed", false);
         ROW(NOT_ACCEPTABLE, 406, "Not Acceptable", false);
+        ROW(AMBIGUOUS, 409, "Conflict", false);
         ROW(RANGE, 416, "Range Not Satisfiable", false);
         ROW(URI_TOO_LONG, 414, "URI Too Long", false);
         ROW(HEADER_TOO_BIG, 431, "Request Header Fields Too Large", false);

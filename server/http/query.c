@@ -2,12 +2,12 @@
 #include "protocol/hex.h"
 #include <string.h>
 
-static bool decode(char *text)
+bool http_decode(char *text, bool plus_is_space)
 {
     char *to = text;
     for (const char *from = text; *from; from++) {
         if (*from != '%') {
-            *to++ = *from == '+' ? ' ' : *from;
+            *to++ = *from == '+' && plus_is_space ? ' ' : *from;
             continue;
         }
         int high = pen_hex_digit(from[1]), low = high < 0 ? -1 : pen_hex_digit(from[2]);
@@ -35,7 +35,7 @@ bool http_split_query(char *query, struct pen_query_pair pairs[HTTP_MAX_PAIRS], 
             *value++ = 0;
         if (*count == HTTP_MAX_PAIRS)
             return pen_fail(error, PEN_MALFORMED, "", "The query has too many keys.");
-        if (!decode(at) || (value && !decode(value)))
+        if (!http_decode(at, true) || (value && !http_decode(value, true)))
             return pen_fail(error, PEN_MALFORMED, "", "The query has an invalid percent-encoding.");
         pairs[(*count)++] = (struct pen_query_pair){at, value};
     }

@@ -47,8 +47,8 @@ static bool too_long(struct pen_error *error)
         error, PEN_TOO_BIG, "", "A render request has at most %d bytes.", PEN_MAX_JSON_BYTES);
 }
 
-/* The key entry; "" when the query does not have it. */
-static bool read_entry(const struct http_exchange *x, enum pen_body takes,
+/* The keys entry and name; "" when the query does not have them. */
+static bool read_keys(struct call_body *body, const struct http_exchange *x, enum pen_body takes,
     char entry[PEN_BUNDLE_MAX_NAME + 1], struct pen_error *error)
 {
     struct pen_query_pair pairs[HTTP_MAX_PAIRS];
@@ -58,10 +58,13 @@ static bool read_entry(const struct http_exchange *x, enum pen_body takes,
     entry[0] = 0;
     for (uint32_t i = 0; ok && i < count; i++) {
         const char *value = pairs[i].value ? pairs[i].value : "";
-        if (takes != PEN_BODY_SCENE_UPLOAD || strcmp(pairs[i].key, "entry"))
+        if (takes == PEN_BODY_SCENE_UPLOAD && !strcmp(pairs[i].key, "name"))
+            snprintf(body->name, sizeof body->name, "%s", value);
+        else if (takes != PEN_BODY_SCENE_UPLOAD || strcmp(pairs[i].key, "entry"))
             ok = pen_fail(error, PEN_INVALID, "",
-                takes == PEN_BODY_SCENE_UPLOAD ? "The upload of a scene takes only the key entry."
-                                               : "The upload of an image takes no keys.");
+                takes == PEN_BODY_SCENE_UPLOAD
+                    ? "The upload of a scene takes only the keys entry and name."
+                    : "The upload of an image takes no keys.");
         else if (!pen_name_tidy(value, strlen(value), entry))
             ok = pen_fail(error, PEN_INVALID, "/entry", "entry must name a file of the upload.");
     }
@@ -90,7 +93,7 @@ static bool open_upload(struct call_body *body, struct service *s, enum pen_body
     if (x->content_length != HTTP_UNKNOWN_LENGTH &&
         !store_quota_fits(scene_store_quota(s->store), x->content_length, error))
         return false;
-    if (!read_entry(x, takes, entry, error))
+    if (!read_keys(body, x, takes, entry, error))
         return false;
     body->has_place = true;
     /* As many again as there are places: until those that keep one for little have left it. */

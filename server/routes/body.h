@@ -11,10 +11,11 @@
 struct call_body {
     char *text; /* not NUL-terminated */
     size_t text_bytes, capacity;
-    struct upload *upload; /* until a handler takes it over */
-    struct gunzip *gunzip; /* NULL: it comes as it is */
-    bool has_place;        /* counts as one of service->uploads */
-    bool unknown_coding;   /* it was refused for its Content-Encoding */
+    struct upload *upload;               /* until a handler takes it over */
+    struct gunzip *gunzip;               /* NULL: it comes as it is */
+    char name[2 * PEN_LABEL_NAME_BYTES]; /* of an upload, as its query says; "": it does not */
+    bool has_place;                      /* counts as one of service->uploads */
+    bool unknown_coding;                 /* it was refused for its Content-Encoding */
 };
 
 /* At the header, before the body is sent: refuses what the address does not take, and finds an

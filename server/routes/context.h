@@ -9,6 +9,7 @@
 #include "server/access/proxy.h"
 #include "server/http/http.h"
 #include "server/jobs/jobs.h"
+#include "server/gallery/labels.h"
 #include "server/live/feed.h"
 #include "server/queue/scheduler.h"
 #include "server/uploads/importer.h"
@@ -23,6 +24,7 @@ struct service {
     const struct config *config;
     const struct pen_catalogue *catalogue;
     struct scene_store *store;
+    struct labels *labels; /* of scenes */
     struct importer *importer;
     struct scrubber *scrubber;
     struct scheduler *scheduler;

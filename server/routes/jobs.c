@@ -63,13 +63,15 @@ struct job_store *routes_find_job(struct call *call, struct job *job, struct pen
 bool route_jobs(struct call *call, struct pen_error *error)
 {
     struct job_store *store = jobs_store(call->service->jobs, error);
+    static const char *const keys[] = {"state", NULL};
     struct page page;
     struct job jobs[PAGE_MOST + 1];
-    if (!store || !page_read(call, "state", &page, error))
+    if (!store || !page_read(call, keys, &page, error))
         return false;
-    int state = *page.value ? pen_choice_index(job_state_names, page.value) : JOB_STATES;
+    int state =
+        page_is_chosen(&page) ? pen_choice_index(job_state_names, page.values[0]) : JOB_STATES;
     if (state < 0)
-        return pen_fail(error, PEN_INVALID, "/state", "There is no state \"%s\".", page.value);
+        return pen_fail(error, PEN_INVALID, "/state", "There is no state \"%s\".", page.values[0]);
     struct job_page part = {.client = call->service->auth ? call_owner(call) : 0,
         .state = (enum job_state)state,
         .before = page.has_after ? page.after : NULL,
@@ -86,7 +88,7 @@ bool route_jobs(struct call *call, struct pen_error *error)
     pen_json_end(&json);
     pen_json_uint(&json, "total", part.total);
     if (part.count > shown)
-        page_write_next(&json, "/v1/jobs", "state", &page, jobs[shown - 1].id);
+        page_write_next(&json, "/v1/jobs", keys, &page, jobs[shown - 1].id);
     pen_json_end(&json);
     http_add_header(call->exchange, "Cache-Control", "no-store");
     return call_json(call, 200, pen_json_finish(&json, NULL));

@@ -12,6 +12,7 @@
 static enum step_end guard(struct call *call, struct pen_error *error);
 static enum step_end find(struct call *call, struct pen_error *error);
 static enum step_end authorise(struct call *call, struct pen_error *error);
+static enum step_end resolve(struct call *call, struct pen_error *error);
 static enum step_end admit(struct call *call, struct pen_error *error);
 static enum step_end receive(struct call *call, struct pen_error *error);
 static enum step_end handle(struct call *call, struct pen_error *error);
@@ -24,6 +25,7 @@ static const struct step life[] = {
     {"guard", guard},         /* whom it is meant for, and which page sends it */
     {"find", find},           /* the address; answers OPTIONS of other origins */
     {"authorise", authorise}, /* the token, and whose share it uses */
+    {"resolve", resolve},     /* an id that is only its first digits */
     {"admit", admit},         /* the body: of the right type and size, an upload finds a place */
     {"receive", receive},     /* waits for the last byte of the body */
     /* The whole request is there. */
@@ -62,8 +64,6 @@ static enum step_end find(struct call *call, struct pen_error *error)
     char allow[64];
     if (pen_route_find(x->method, x->path, &call->address)) {
         call->label = call->address.route->pattern;
-        if (!strncmp(call->label, "/v1/scenes/{id}", 15))
-            pen_id_to_hex(call->address.id, call->note.scene);
         return STEP_NEXT;
     }
     if (!call->address.methods) {
@@ -90,8 +90,8 @@ static enum step_end find(struct call *call, struct pen_error *error)
 static enum auth_scope scope_of(const struct pen_route *route)
 {
     bool reads = !strcmp(route->method, "GET");
-    if (pen_upload_types((enum pen_body)route->takes) || route->id == PEN_ROUTE_scene_delete ||
-        route->id == PEN_ROUTE_image_delete)
+    if (pen_upload_types((enum pen_body)route->takes) || route->id == PEN_ROUTE_scene_patch ||
+        route->id == PEN_ROUTE_scene_delete || route->id == PEN_ROUTE_image_delete)
         return AUTH_UPLOAD;
     return reads && route->gives != PEN_BODY_RENDERED ? AUTH_READ : AUTH_RENDER;
 }
@@ -125,6 +125,15 @@ static enum step_end authorise(struct call *call, struct pen_error *error)
         return enter(call, error) ? STEP_NEXT : STEP_FAILED;
     pen_fail(error, PEN_UNAUTHORIZED, "", "This address needs a bearer token.");
     return STEP_FAILED;
+}
+
+static enum step_end resolve(struct call *call, struct pen_error *error)
+{
+    if (!routes_resolve(call, error))
+        return STEP_FAILED;
+    if (!strncmp(call->label, "/v1/scenes/{id}", 15))
+        pen_id_to_hex(call->address.id, call->note.scene);
+    return STEP_NEXT;
 }
 
 static uint64_t stored_bytes(void *context, const uint8_t id[PEN_ID_BYTES])

@@ -19,7 +19,24 @@ static bool read_limit(const char *value, struct page *page, struct pen_error *e
     return true;
 }
 
-bool page_read(struct call *call, const char *key, struct page *page, struct pen_error *error)
+static int key_index(const char *const *keys, const char *key)
+{
+    for (int k = 0; keys && keys[k]; k++)
+        if (!strcmp(keys[k], key))
+            return k;
+    return -1;
+}
+
+static bool refuse_key(const char *const *keys, struct pen_error *error)
+{
+    char list[128] = "";
+    for (int k = 0; keys && keys[k]; k++)
+        snprintf(list + strlen(list), sizeof list - strlen(list), ", %s", keys[k]);
+    return pen_fail(error, PEN_INVALID, "", "This list takes only the keys limit, after%s.", list);
+}
+
+bool page_read(
+    struct call *call, const char *const *keys, struct page *page, struct pen_error *error)
 {
     struct pen_query_pair pairs[HTTP_MAX_PAIRS];
     uint32_t count;
@@ -28,29 +45,39 @@ bool page_read(struct call *call, const char *key, struct page *page, struct pen
         return false;
     for (uint32_t i = 0; i < count; i++) {
         const char *value = pairs[i].value ? pairs[i].value : "";
+        int own = key_index(keys, pairs[i].key);
         if (!strcmp(pairs[i].key, "limit")) {
             if (!read_limit(value, page, error))
                 return false;
         } else if (!strcmp(pairs[i].key, "after")) {
             if (!(page->has_after = pen_id_from_hex(value, page->after)))
                 return pen_fail(error, PEN_INVALID, "/after", "after must be an id.");
-        } else if (key && !strcmp(pairs[i].key, key)) {
-            snprintf(page->value, sizeof page->value, "%s", value);
+        } else if (own >= 0) {
+            snprintf(page->values[own], sizeof page->values[own], "%s", value);
         } else {
-            return pen_fail(error, PEN_INVALID, "", "This list takes only the keys limit%s%s.",
-                key ? ", after and " : " and after", key ? key : "");
+            return refuse_key(keys, error);
         }
     }
     return true;
 }
 
-void page_write_next(struct pen_json *json, const char *path, const char *key,
+bool page_is_chosen(const struct page *page)
+{
+    return page->values[0][0] || page->values[1][0];
+}
+
+void page_write_next(struct pen_json *json, const char *path, const char *const *keys,
     const struct page *page, const uint8_t last[PEN_ID_BYTES])
 {
-    char next[PEN_ID_HEX + 160], hex[PEN_ID_HEX + 1];
+    char next[PEN_ID_HEX + 64 + PAGE_KEYS * (3 * PEN_LABEL_NAME_BYTES + 16)], hex[PEN_ID_HEX + 1];
     pen_id_to_hex(last, hex);
-    int bytes = snprintf(next, sizeof next, "%s?limit=%u&after=%s", path, page->limit, hex);
-    if (*page->value)
-        snprintf(next + bytes, sizeof next - (size_t)bytes, "&%s=%s", key, page->value);
+    char *out = next + sprintf(next, "%s?limit=%u&after=%s", path, page->limit, hex);
+    for (int k = 0; keys && keys[k]; k++) {
+        if (!page->values[k][0])
+            continue;
+        out += sprintf(out, "&%s=", keys[k]);
+        for (const char *c = page->values[k]; *c; c++)
+            out += sprintf(out, "%%%02x", (unsigned char)*c);
+    }
     pen_json_string(json, "next", next);
 }

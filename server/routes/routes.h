@@ -13,6 +13,10 @@ extern const struct http_callbacks routes_callbacks, routes_admin_callbacks;
 
 /* What each event of /v1/events says; malloc'd. */
 char *routes_live_json(void *service);
+/* Addresses name their entry by its id or by the first digits of it: puts the whole id in place of
+ * these, as far as the caller may see what there is. Errors: PEN_NOT_FOUND, PEN_AMBIGUOUS with what
+ * it may be, PEN_INVALID where all digits are asked for, and those of the jobs' database. */
+bool routes_resolve(struct call *call, struct pen_error *error);
 /* Everything that a request refers to must be in the store. */
 bool routes_check_store(
     struct call *call, const struct pen_request *request, struct pen_error *error);

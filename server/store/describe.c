@@ -150,7 +150,7 @@ static bool mend_meta(struct scene_store *store, enum store_kind kind,
 }
 
 char *describe_stored(struct scene_store *store, enum store_kind kind,
-    const uint8_t id[PEN_ID_BYTES], bool resident, struct pen_error *error)
+    const uint8_t id[PEN_ID_BYTES], const struct store_now *now, struct pen_error *error)
 {
     struct pen_error damage = {0};
     cJSON *root = read_meta(store, kind, id, &damage);
@@ -161,7 +161,16 @@ char *describe_stored(struct scene_store *store, enum store_kind kind,
         return NULL;
     }
     if (kind == STORE_SCENES)
-        cJSON_ReplaceItemInObjectCaseSensitive(root, "resident", cJSON_CreateBool(resident));
+        cJSON_ReplaceItemInObjectCaseSensitive(root, "resident", cJSON_CreateBool(now->resident));
+    cJSON *label = kind == STORE_SCENES && now->label ? cJSON_Parse(now->label) : NULL;
+    while (label && label->child) {
+        cJSON *member = cJSON_DetachItemViaPointer(label, label->child);
+        char *key = strdup(member->string);
+        cJSON_DeleteItemFromObjectCaseSensitive(root, key);
+        cJSON_AddItemToObject(root, key, member);
+        free(key);
+    }
+    cJSON_Delete(label);
     char *text = cJSON_PrintUnformatted(root);
     cJSON_Delete(root);
     if (!text)

@@ -7,12 +7,13 @@
 
 #define STORE_SOURCE "source"
 #define STORE_META "meta.json"
+#define STORE_THUMBNAIL "thumbnail"
 
 enum store_kind { STORE_SCENES, STORE_IMAGES, STORE_KINDS };
 
 struct store_entry {
     uint8_t id[PEN_ID_BYTES];
-    uint64_t source_bytes, blob_bytes;
+    uint64_t source_bytes, blob_bytes, thumbnail_bytes;
     int64_t stored_unix_s;
     bool stale;      /* its blob is of another version, or damaged: to be imported again */
     bool importing;  /* somebody has been asked to */
@@ -25,7 +26,7 @@ struct store_entry {
 #define STORE_ENTRY_BYTES 8192
 static inline uint64_t store_entry_size(const struct store_entry *entry)
 {
-    return entry->source_bytes + entry->blob_bytes + STORE_ENTRY_BYTES;
+    return entry->source_bytes + entry->blob_bytes + entry->thumbnail_bytes + STORE_ENTRY_BYTES;
 }
 
 struct scene_store;

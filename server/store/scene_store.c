@@ -248,8 +248,10 @@ bool scene_store_refresh(struct scene_store *store, enum store_kind kind,
               file_replace(staging->folder, STORE_META, folder, STORE_META) &&
               file_replace(staging->folder, STORE_SUMS, folder, STORE_SUMS) && !fsync(folder);
     int failed = errno;
-    if (folder >= 0)
+    if (folder >= 0) {
+        unlinkat(folder, STORE_THUMBNAIL, 0); /* of what the scene was */
         close(folder);
+    }
     scene_store_discard(store, staging);
     if (!ok || !scene_store_inspect(store, kind, hex, &entry))
         return store_write_failed(failed, error);

@@ -42,6 +42,9 @@ int scene_store_open_meta(struct scene_store *store, enum store_kind kind,
 /* The entry's folder, for what is derived from it: goes with the entry. -1: not there. */
 int scene_store_open_folder(struct scene_store *store, enum store_kind kind,
     const uint8_t id[PEN_ID_BYTES], struct pen_error *error);
+/* The thumbnail in a scene's folder has so many bytes now, of which `claimed` were claimed. */
+void scene_store_set_thumbnail(
+    struct scene_store *store, const uint8_t id[PEN_ID_BYTES], uint64_t bytes, uint64_t claimed);
 bool scene_store_remove(struct scene_store *store, enum store_kind kind,
     const uint8_t id[PEN_ID_BYTES], struct pen_error *error);
 

@@ -100,6 +100,9 @@ bool scene_store_inspect(
         !fstatat(folder, STORE_SOURCE, &status, AT_SYMLINK_NOFOLLOW) && S_ISREG(status.st_mode);
     entry->source_bytes = has_source ? (uint64_t)status.st_size : 0;
     entry->stored_unix_s = has_source ? status.st_mtim.tv_sec : 0;
+    bool has_thumbnail =
+        !fstatat(folder, STORE_THUMBNAIL, &status, AT_SYMLINK_NOFOLLOW) && S_ISREG(status.st_mode);
+    entry->thumbnail_bytes = has_thumbnail ? (uint64_t)status.st_size : 0;
     entry->stale = !is_good_blob(folder, kind, entry->id, &entry->blob_bytes);
     close(folder);
     return has_source || !entry->stale;
@@ -125,6 +128,18 @@ void scene_store_renew(
         store_quota_settle(store->quota, store_entry_size(found), store_entry_size(entry));
         *found = *entry;
     }
+    pthread_mutex_unlock(&store->lock);
+}
+
+void scene_store_set_thumbnail(
+    struct scene_store *store, const uint8_t id[PEN_ID_BYTES], uint64_t bytes, uint64_t claimed)
+{
+    pthread_mutex_lock(&store->lock);
+    struct store_entry *found = store_index_find(&store->lists[STORE_SCENES], id);
+    uint64_t before = found ? store_entry_size(found) : 0;
+    if (found)
+        found->thumbnail_bytes = bytes;
+    store_quota_settle(store->quota, claimed + before, found ? store_entry_size(found) : 0);
     pthread_mutex_unlock(&store->lock);
 }
 

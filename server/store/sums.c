@@ -31,6 +31,11 @@ static bool add_up(int file, struct sum *sum)
     return !n;
 }
 
+uint64_t sums_of(const void *data, size_t bytes)
+{
+    return crc64_ecma_refl(0, data, (uint64_t)bytes);
+}
+
 static struct sums_mark mark_of(const struct stat *status)
 {
     return (struct sums_mark){(uint64_t)status->st_ino, (uint64_t)status->st_size,

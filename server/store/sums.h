@@ -3,6 +3,7 @@
  * against accidents, not against those who may write to the store. */
 #pragma once
 #include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
 #include <sys/types.h>
 
@@ -15,6 +16,8 @@ struct sums_mark {
     int64_t written_ns, changed_ns;
 };
 
+/* The checksum of bytes in memory. */
+uint64_t sums_of(const void *data, size_t bytes);
 /* Of the named files in `folder`, whatever their sums were; synced. */
 bool sums_write(int folder, const char *const *names, uint32_t count);
 /* True when `file` is what sums_write saw under that name. Read only if *mark (which may be NULL)

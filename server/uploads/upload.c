@@ -229,3 +229,13 @@ uint64_t upload_bytes(const struct upload *u)
 {
     return u->bytes;
 }
+
+const char *upload_name(const struct upload *u)
+{
+    if (*u->entry)
+        return u->entry;
+    for (uint32_t i = 0; i < u->part_count; i++)
+        if (u->part_count == 1 || !stands_alone(u->parts[i].name))
+            return u->parts[i].name;
+    return "";
+}

@@ -16,6 +16,8 @@ void upload_destroy(struct upload *upload);
 bool upload_add(struct upload *upload, const void *data, size_t bytes, struct pen_error *error);
 /* The body is over: writes the source file and gives its id. May take a while. */
 bool upload_finish(struct upload *upload, uint8_t id[PEN_ID_BYTES], struct pen_error *error);
+/* The name of the file that it is, or that says most about it; "": nobody said. */
+const char *upload_name(const struct upload *upload);
 /* The folder with the finished source; the importer commits or discards it. */
 struct store_staging *upload_staging(struct upload *upload);
 uint64_t upload_bytes(const struct upload *upload);

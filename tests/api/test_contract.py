@@ -140,7 +140,7 @@ class Contract(unittest.TestCase):
 
     def test_no_such_address(self):
         for path in ("/v2", "/v1/", "//v1", "/v1/../v1", "/v1/%2e%2e/etc", "/v1%00", "/V1",
-                     "/v1/scenes/" + self.id.upper(), "/v1/scenes/" + self.id[:-1],
+                     "/v1/scenes/" + self.id.upper(), "/v1/scenes/" + self.id[:5],
                      "/v1/scenes/%s/" % self.id, "/v1/scenes/../../etc/passwd", "/v1/jobs/",
                      "/%76%31", "/v1/scenes/%s/render/x" % self.id):
             self.problem(self.d.get(path), 404)
@@ -152,7 +152,7 @@ class Contract(unittest.TestCase):
     def test_wrong_method(self):
         for method, path, allow in (
                 ("POST", "/v1", "GET, HEAD"), ("DELETE", "/v1/scenes", "GET, HEAD, POST, PUT"),
-                ("PATCH", "/v1/scenes/" + self.id, "GET, HEAD, PUT, DELETE"),
+                ("POST", "/v1/scenes/" + self.id, "GET, HEAD, PUT, PATCH, DELETE"),
                 ("PUT", "/v1/scenes/%s/render" % self.id, "GET, HEAD, POST"),
                 ("OPTIONS", "/v1", "GET, HEAD"), ("BREW", "/", "GET, HEAD")):
             answer = self.d.call(method, path)
@@ -193,6 +193,11 @@ class Contract(unittest.TestCase):
         self.problem(self.d.call("DELETE", "/v1/scenes/" + name), 404)
         self.problem(self.d.get("/v1/scenes/" + name), 404)
         self.problem(self.d.get("/v1/scenes/%s/render" % name), 404)
+
+    def test_what_a_scene_is_called(self):
+        answer = self.d.call("PATCH", "/v1/scenes/" + self.id, '{"name": "grid", "tags": []}',
+                             {"Content-Type": "application/json"})
+        self.assertEqual((answer.status, answer.json()["name"]), (200, "grid"))
 
     def test_pages_of_scenes(self):
         ids = {self.d.upload(grid_scene(1, "page %d" % i)) for i in range(5)}

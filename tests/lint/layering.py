@@ -54,7 +54,7 @@ RULES = [
 # ending) in it. A file may include what lies in its own folder or on a floor below, not its
 # neighbours on the same floor.
 FLOORS = {
-    "server": [["base"], ["wire"], ["access", "http", "store", "pages"], ["queue", "uploads", "live"], ["workers"], ["auto", "jobs/store"], ["jobs"], ["routes"],
+    "server": [["base"], ["wire"], ["access", "http", "store", "pages"], ["queue", "uploads", "live", "gallery"], ["workers"], ["auto", "jobs/store"], ["jobs"], ["routes"], ["routes/stored"],
                [""]],
     "renderer": [
         ["device", "picture", "shared", "shaders/*", "metrics", "catalogue/catalogue"],

@@ -64,6 +64,29 @@ class Client(unittest.TestCase):
             self.assertEqual(sorted(told), told)
         return scene, told[-1][0] if told else 0
 
+    def test_what_scenes_are_called(self):
+        glb = lambda n: harness.grid_scene(1, "called %d" % n)
+        parts = {"hall/" + name: data for name, data in parted("called").items()}
+        path = self.path("called/Tea pot.glb", glb(1))
+        folder = os.path.dirname(self.path("inside/Only.glb", glb(2)))
+        for thing, name in ((glb(0), ""), (path, "Tea pot"), (folder, "Only"), (parts, "scene"),
+                            ({"a/Named.glb": glb(3)}, "Named")):
+            self.assertEqual(self.client.upload(thing).name, name, thing)
+        self.assertEqual(self.client.upload(glb(4), name="Given").name, "Given")
+        scene = self.client.upload(path)
+        self.assertIn("'Tea pot'", repr(scene))
+        scene.change(tags=["kitchen", "small"])
+        self.assertEqual((scene.name, scene.tags), ("Tea pot", ["kitchen", "small"]))
+        self.assertEqual(list(self.client.scenes(tag="kitchen")), [scene])
+        self.assertEqual(list(self.client.scenes(name="TEA", tag="small")), [scene])
+        self.assertEqual(self.client.scene(scene.id[:10]), scene)
+        scene.change(name=None, tags=None)
+        self.assertEqual((scene.refresh().name, scene.tags), ("", []))
+        with self.assertRaises(penumbra.Invalid):
+            scene.change(name="x" * 200)
+        small = scene.thumbnail()
+        self.assertEqual((small.format, small.bytes[:2]), ("jpeg", b"\xff\xd8"))
+
     def test_a_file_in_every_form(self):
         data = harness.grid_scene(1, "forms")
         path = self.path("forms/any.glb", data)

@@ -47,9 +47,13 @@ int main(void)
         if (found || match.methods)
             fprintf(stderr, "found: %s\n", nowhere[i]), check_failures++;
     }
-    CHECK(!pen_route_find("PATCH", "/v1/scenes/" ID, &match) && match.methods);
+    CHECK(pen_route_find("GET", "/v1/scenes/" ID, &match) && match.id_digits == PEN_ID_HEX);
+    CHECK(pen_route_find("GET", "/v1/scenes/0123456", &match) && match.id_digits == 7);
+    CHECK(match.id[0] == 0x01 && match.id[2] == 0x45 && match.id[3] == 0x60 && !match.id[31]);
+    CHECK(!pen_route_find("GET", "/v1/scenes/01234", &match));
+    CHECK(!pen_route_find("POST", "/v1/scenes/" ID, &match) && match.methods);
     pen_route_allow(match.methods, allow, sizeof allow);
-    CHECK_STR(allow, "GET, HEAD, PUT, DELETE");
+    CHECK_STR(allow, "GET, HEAD, PUT, PATCH, DELETE");
     CHECK(!pen_route_find("DELETE", "/v1/scenes", &match) && match.methods);
     pen_route_allow(match.methods, allow, sizeof allow);
     CHECK_STR(allow, "GET, HEAD, POST, PUT");

@@ -31,6 +31,22 @@ test("uploads of every kind give the id that the bytes have", async () => {
   assert.equal((await daemon.scene(id)).triangles, 32);
 });
 
+test("scenes have names, tags and small pictures", async () => {
+  const named = await daemon.upload(Object.assign(new Blob([glb]), { name: "Tea pot.glb" }));
+  assert.equal(named.name, "Tea pot");
+  const changed = await daemon.changeScene(id.slice(0, 8), { name: "Room & hall", tags: ["a"] });
+  assert.deepEqual([changed.name, changed.tags, changed.id], ["Room & hall", ["a"], id]);
+  for (const [query, found] of [[{ name: "& HALL" }, 1], [{ tag: "a" }, 1], [{ tag: "b" }, 0]]) {
+    const scenes = [];
+    for await (const scene of daemon.scenes(query)) scenes.push(scene.id);
+    assert.deepEqual(scenes, found ? [id] : [], JSON.stringify(query));
+  }
+  const bytes = await bytesOf((await daemon.thumbnail(id)).blob);
+  assert.deepEqual([...bytes.subarray(0, 2)], [0xff, 0xd8]);
+  await daemon.changeScene(id, { name: null, tags: null });
+  assert.equal((await daemon.scene(id)).name, "");
+});
+
 test("a glTF with its files goes as a form", async () => {
   const document = JSON.parse(glb.toString("utf8", 20, 20 + glb.readUInt32LE(12)));
   document.buffers[0].uri = "parts/grid.bin";

@@ -57,13 +57,17 @@ class Bytes:
 class Upload:
     """What is sent: method, path below the folder, query, type, size, and its pieces."""
 
-    def __init__(self, parts, entry=""):
-        """parts: {name: Bytes}; a lone one that is no .gltf is sent as it is."""
+    def __init__(self, parts, entry="", name=""):
+        """parts: {name: Bytes}; a lone one that is no .gltf is sent as it is. `name`: what the
+        scene is to be called; else as its file."""
         self.parts = sorted(((os.fsencode(name), data) for name, data in parts.items()),
                             key=lambda part: part[0])
-        name, first = self.parts[0]
-        self.alone = len(self.parts) == 1 and not name.lower().endswith(b".gltf")
-        self.query = "?entry=" + urllib.parse.quote(entry, safe="") if entry else ""
+        first_name, first = self.parts[0]
+        self.alone = len(self.parts) == 1 and not first_name.lower().endswith(b".gltf")
+        said = {"entry": entry, "name": name or entry}
+        self.query = "?" + urllib.parse.urlencode({k: v for k, v in said.items() if v},
+                                                  errors="surrogateescape")
+        self.query = self.query if self.query != "?" else ""
         self.id = self.hash(os.fsencode(entry))
         self.method = "PUT" if self.alone and not entry else "POST"
         if self.alone:
@@ -167,7 +171,7 @@ def gltf_files(root, gltf):
     return whole
 
 
-def of_folder(root, entry):
+def of_folder(root, entry, name):
     scenes = [name for name in listing(root) if name.lower().endswith(SCENES)]
     if entry:
         scenes = [name for name in scenes if name == entry]
@@ -175,23 +179,27 @@ def of_folder(root, entry):
         raise ValueError("%s holds %s" % (root, "several scenes, `entry` says which: " + ", ".join(
             scenes[:8]) if scenes else "no scene" + (" " + entry if entry else "")))
     if scenes[0].lower().endswith(".gltf"):
-        return Upload(gltf_files(root, scenes[0]))
-    return Upload({scenes[0]: Bytes(os.path.join(root, *scenes[0].split("/")))})
+        return Upload(gltf_files(root, scenes[0]), name=name or scenes[0])
+    return Upload({scenes[0]: Bytes(os.path.join(root, *scenes[0].split("/")))},
+                  name=name or scenes[0])
 
 
-def prepare(thing, entry=""):
+def prepare(thing, entry="", name=""):
     """An Upload of a path, a folder, bytes, an open file, or {name: any of these but a folder}."""
     if isinstance(thing, dict):
         if not thing:
             raise ValueError("nothing to upload")
-        return Upload({str(name): as_bytes(data) for name, data in thing.items()}, entry)
+        if len(thing) == 1 and not entry:
+            name = name or str(next(iter(thing)))
+        return Upload({str(file): as_bytes(data) for file, data in thing.items()}, entry, name)
     if isinstance(thing, (str, os.PathLike)):
         path = os.fsdecode(thing)
         if os.path.isdir(path):
-            return of_folder(path, entry)
+            return of_folder(path, entry, name)
+        name = name or (os.path.basename(path) if not entry else "")
         if path.lower().endswith(".gltf"):
-            return Upload(gltf_files(os.path.dirname(path) or ".", os.path.basename(path)), entry)
-    return Upload({"scene": as_bytes(thing)}, entry)
+            return Upload(gltf_files(os.path.dirname(path) or ".", os.path.basename(path)), entry, name)
+    return Upload({"scene": as_bytes(thing)}, entry, name)
 
 
 def as_bytes(thing):

@@ -60,7 +60,7 @@ class Client:
 
     # ---- scenes and images ----
 
-    def upload(self, scene: Any, *, entry: str = "",
+    def upload(self, scene: Any, *, entry: str = "", name: str = "",
                progress: Optional[Callable[[int, int], None]] = None) -> Scene:
         """Uploads a scene unless the service has it, which its SHA-256 tells before.
 
@@ -68,12 +68,13 @@ class Client:
             folder that holds one scene; bytes; a file opened in binary mode; or
             {name: path or bytes}.
         entry: which one, where there are several in a folder or zip; its path in there.
+        name: what it is to be called; else as its file. A scene that has a name keeps it.
         progress: called with the bytes sent and all, while they go.
 
         Raises besides Problem (Invalid: what is wrong with the file) FileNotFoundError for what is
         not there, and ValueError for a folder without a scene, or with several and no `entry`.
         """
-        return Scene(self, self._upload("/v1/scenes", scene, entry, progress))
+        return Scene(self, self._upload("/v1/scenes", scene, entry, progress, name))
 
     def upload_image(self, image: Any, *,
                      progress: Optional[Callable[[int, int], None]] = None) -> "types.ImageInfo":
@@ -81,13 +82,14 @@ class Client:
         A light has it as {"type": "rect", "texture": {"image": info["id"]}}."""
         return self._upload("/v1/images", image, "", progress)
 
-    def _upload(self, folder, thing, entry, progress):
-        upload = prepare(thing, entry)
+    def _upload(self, folder, thing, entry, progress, name=""):
+        upload = prepare(thing, entry, name)
         # Who may upload may not always look.
         known = self._http.call("GET", folder + "/" + upload.id, accepted=(403, 404))
         if known.status == 200:
             return known.json()
-        path = folder + ("/" + upload.id if upload.method == "PUT" else "") + upload.query
+        query = upload.query if folder == "/v1/scenes" else ""  # images have no names
+        path = folder + ("/" + upload.id if upload.method == "PUT" else "") + query
         return self._http.call(
             upload.method, path, lambda: upload.told(progress),
             {"Content-Type": upload.type, "Content-Length": str(upload.size)}, (), IMPORT_S).json()
@@ -98,12 +100,16 @@ class Client:
             yield from page[key]
             path = page.get("next")
 
-    def scenes(self) -> Iterator[Scene]:
-        """The stored scenes, page after page as they are asked for."""
-        return (Scene(self, info) for info in self._pages("/v1/scenes", "scenes"))
+    def scenes(self, name: str = "", tag: str = "") -> Iterator[Scene]:
+        """The stored scenes, page after page as they are asked for; only those whose name has
+        `name` in it, whatever its case, and with this tag, where one is given."""
+        said = {key: value for key, value in (("name", name), ("tag", tag)) if value}
+        path = "/v1/scenes" + ("?" + urllib.parse.urlencode(said) if said else "")
+        return (Scene(self, info) for info in self._pages(path, "scenes"))
 
     def scene(self, id: str) -> Scene:
-        """A stored scene, by its id. NotFound when there is none."""
+        """A stored scene, by its id or the first digits of it (at least six) that no other has.
+        NotFound when there is none, a Problem of status 409 when there are several."""
         return Scene(self, self._get("/v1/scenes/", id))
 
     def images(self) -> Iterator["types.ImageInfo"]:

@@ -1,7 +1,7 @@
 """A stored scene, and what can be asked of it."""
 import json
 import secrets
-from typing import List
+from typing import Any, List, Optional, Sequence
 
 from . import _types as types
 from ._calls import SceneCalls
@@ -10,6 +10,8 @@ from ._http import BROKEN
 from .errors import NotFound, PenumbraError, Unreachable, make_problem
 from .jobs import Job
 from .pictures import Comparison, Picture
+
+KEEP: Any = object()  # what was not given stays as it is
 
 # When nothing was said; a test holds it against the OpenAPI document.
 DEADLINE_MS = 30000
@@ -54,12 +56,23 @@ class Scene(SceneCalls):
         return self.info["id"]
 
     @property
+    def name(self) -> str:
+        """What it is called; "" when nobody said."""
+        return self.info["name"]
+
+    @property
+    def tags(self) -> List[str]:
+        """Words that it is found by; see Client.scenes."""
+        return list(self.info["tags"])
+
+    @property
     def warnings(self) -> List[str]:
         """What of the file is not shown as it says, in words."""
         return list(self.info["warnings"])
 
     def __repr__(self):
-        return "<Scene %s, %d triangles>" % (self.id[:12], self.info["triangles"])
+        called = " %r" % self.name if self.name else ""
+        return "<Scene %s%s, %d triangles>" % (self.id[:12], called, self.info["triangles"])
 
     def __eq__(self, other):
         return isinstance(other, Scene) and self.id == other.id
@@ -71,6 +84,21 @@ class Scene(SceneCalls):
         """Asks for its description again. NotFound when it was removed."""
         self.info = self.client._http.get(self._path())
         return self
+
+    def change(self, *, name: Optional[str] = KEEP,
+               tags: Optional[Sequence[str]] = KEEP) -> "Scene":
+        """Changes its name, or its tags to these; None: it has none any more. Denied when the scene
+        is somebody else's, Invalid for what cannot be."""
+        given = {"name": name, "tags": tags if tags is KEEP or tags is None else list(tags)}
+        changes = {key: value for key, value in given.items() if value is not KEEP}
+        self.info = self.client._http.call(
+            "PATCH", self._path(), json.dumps(changes).encode(),
+            {"Content-Type": "application/json"}).json()
+        return self
+
+    def thumbnail(self) -> Picture:
+        """A small picture (JPEG) of it, which the service makes once and keeps."""
+        return self.client._picture(self._path("/thumbnail"))
 
     def delete(self) -> None:
         """Removes it from the service, for everybody. Denied when it is somebody else's."""

@@ -126,5 +126,5 @@ if $once; then
     exit
 fi
 echo
-echo "Dashboard: $server/    (Ctrl-C stops)"
+echo "Viewer: $server/    (Ctrl-C stops)"
 wait "$daemon"

@@ -119,6 +119,10 @@ static void write_content(struct pen_json *json, enum pen_body body)
     case PEN_BODY_MODULE:
         write_media(json, "text/javascript", NULL);
         break;
+    case PEN_BODY_ASSET:
+        write_media(json, "text/javascript", NULL);
+        write_media(json, "text/css", NULL);
+        break;
     default:
         write_media(json, "application/json", schemas[body]);
     }
@@ -258,10 +262,11 @@ static void write_parameters(
     static const char *const placeholders[][3] = {
         {"{id}", "id", "{\"$ref\":\"" SCHEMA "IdPrefix\"}"},
         {"{name}", "name", "{\"$ref\":\"" SCHEMA "TechniqueName\"}"},
+        {"{file}", "file", "{\"type\":\"string\"}"},
         {"{number}", "number", "{\"type\":\"integer\",\"minimum\":0}"},
     };
     pen_json_array(json, "parameters");
-    for (int i = 0; i < 3; i++) {
+    for (int i = 0; i < 4; i++) {
         if (!strstr(route->pattern, placeholders[i][0]))
             continue;
         pen_json_object(json, NULL);

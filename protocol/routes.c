@@ -42,8 +42,10 @@ static bool capture(
         match->number = (uint32_t)strtoul(token, NULL, 10);
         return true;
     }
-    if (!bytes || bytes >= sizeof match->name ||
-        strspn(token, "abcdefghijklmnopqrstuvwxyz0123456789-") < bytes)
+    const char *letters = !strncmp(placeholder, "{file}", 6)
+                              ? "abcdefghijklmnopqrstuvwxyz0123456789-."
+                              : "abcdefghijklmnopqrstuvwxyz0123456789-";
+    if (!bytes || bytes >= sizeof match->name || strspn(token, letters) < bytes)
         return false;
     memcpy(match->name, token, bytes);
     match->name[bytes] = 0;

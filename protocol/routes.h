@@ -26,6 +26,7 @@ enum pen_body {
     PEN_BODY_THUMBNAIL, /* a small JPEG */
     PEN_BODY_PAGE,      /* HTML */
     PEN_BODY_MODULE,    /* JavaScript */
+    PEN_BODY_ASSET,     /* JavaScript or CSS */
     PEN_BODY_EVENTS,    /* what becomes of a job */
     PEN_BODY_LIVE,      /* what the service counts */
     PEN_BODY_FRAME,     /* an image, or the request that gives it */
@@ -56,7 +57,7 @@ struct pen_route {
     const char *method; /* "GET" also serves HEAD */
     const char *
         pattern; /* "{id}" is an id or at least its first PEN_ID_PREFIX digits, "{name}" a method's name,
-                            "{number}" a whole number */
+                            "{file}" a file's, "{number}" a whole number */
     const char *operation;
     const char *summary;
     uint8_t takes, gives; /* enum pen_body */
@@ -68,7 +69,7 @@ struct pen_route_match {
     const struct pen_route *route;       /* NULL: none */
     uint8_t id[PEN_ID_BYTES];            /* what stood for {id}, zeros behind its digits */
     uint32_t id_digits;                  /* how many it had; PEN_ID_HEX: all */
-    char name[PEN_TECHNIQUE_NAME_BYTES]; /* what stood for {name}, or "" */
+    char name[PEN_TECHNIQUE_NAME_BYTES]; /* what stood for {name} or {file}, or "" */
     uint32_t number;                     /* what stood for {number} */
     uint64_t methods;                    /* bit r: row r has this path, whatever its method */
 };

@@ -4,6 +4,20 @@
 #include <string.h>
 #include <strings.h>
 
+/* The weight of the item that begins at `at`, `bytes` long, 0 to 1. */
+static double weight(const char *at, size_t bytes)
+{
+    double q = 1;
+    for (const char *p = memchr(at, ';', bytes); p && p < at + bytes;) {
+        p++;
+        p += strspn(p, " \t");
+        if ((*p == 'q' || *p == 'Q') && p[1] == '=')
+            q = strtod(p + 2, NULL);
+        p = memchr(p, ';', (size_t)(at + bytes - p));
+    }
+    return q;
+}
+
 /* The quality, 0 to 1, that the most specific matching range gives to `type`; -1: none matches.
  * *exact is true when the type itself is named. */
 static double quality(const char *accept, const char *type, bool *exact)
@@ -22,15 +36,7 @@ static double quality(const char *accept, const char *type, bool *exact)
         else if (range == 3 && !strncmp(at, "*/*", 3))
             level = 1;
         if (level > best_level) {
-            double q = 1;
-            for (const char *p = memchr(at, ';', item); p && p < at + item;) {
-                p++;
-                p += strspn(p, " \t");
-                if ((*p == 'q' || *p == 'Q') && p[1] == '=')
-                    q = strtod(p + 2, NULL);
-                p = memchr(p, ';', (size_t)(at + item - p));
-            }
-            best = q;
+            best = weight(at, item);
             best_level = level;
         }
         at = at[item] ? at + item + 1 : NULL;
@@ -43,6 +49,21 @@ static double quality(const char *accept, const char *type, bool *exact)
 bool accept_allows(const char *accept, const char *type)
 {
     return !accept || quality(accept, type, NULL) > 0;
+}
+
+bool accept_coding(const char *accept, const char *coding)
+{
+    double named = -1, any = -1;
+    for (const char *at = accept; at;) {
+        at += strspn(at, " \t,");
+        size_t item = strcspn(at, ","), word = strcspn(at, ",; \t");
+        if (word == strlen(coding) && !strncasecmp(at, coding, word))
+            named = weight(at, item);
+        else if (word == 1 && *at == '*')
+            any = weight(at, item);
+        at = at[item] ? at + item + 1 : NULL;
+    }
+    return (named >= 0 ? named : any) > 0;
 }
 
 const char *const accept_form_mime[ACCEPT_FORMS] = {

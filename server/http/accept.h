@@ -4,6 +4,9 @@
 
 /* True when `type` ("image/png") may be sent; a missing header allows everything. */
 bool accept_allows(const char *accept, const char *type);
+/* True when a content coding ("gzip") may be sent, by the Accept-Encoding header (RFC 9110, section
+ * 12.5.3); a missing header allows none, as few who send none can undo one. */
+bool accept_coding(const char *accept, const char *coding);
 /* In what form the answer to a render is wanted. */
 enum accept_form {
     ACCEPT_PICTURE,

@@ -1,11 +1,85 @@
 #include "server/pages/pages.h"
+#include "protocol/memory.h"
+#include "protocol/request.h"
+#include "server/base/hash.h"
+#include <pthread.h>
+#include <stdlib.h>
+#include <string.h>
+#include <zlib.h>
 
 #define EMBED(symbol, file)                                                                        \
     __asm__(".section .rodata\n.global " #symbol "\n.global " #symbol "_end\n" #symbol             \
-            ":\n.incbin \"" file "\"\n" #symbol "_end:\n.byte 0\n.previous\n")
+            ":\n.incbin \"" file "\"\n" #symbol "_end:\n.byte 0\n.previous\n");
 
-EMBED(page_home, PAGES_FOLDER "/home.html");
-EMBED(module_home, PAGES_FOLDER "/home.js");
-EMBED(page_docs, PAGES_FOLDER "/docs.html");
-EMBED(module_client, MODULES_FOLDER "/penumbra.js");
-EMBED(module_view, MODULES_FOLDER "/penumbra-view.js");
+#define PAGE(symbol, type, path, folder, file)                                                     \
+    EMBED(page_##symbol, folder file)                                                              \
+    extern const char page_##symbol[], page_##symbol##_end[];
+#include "server/pages/pages.def"
+
+enum {
+#define PAGE(symbol, ...) NUMBER_##symbol,
+#include "server/pages/pages.def"
+    PAGES
+};
+
+const char *const page_mime[] = {[PAGE_HTML] = "text/html; charset=utf-8",
+    [PAGE_MODULE] = "text/javascript; charset=utf-8",
+    [PAGE_STYLE] = "text/css; charset=utf-8"};
+
+static struct page_file files[PAGES] = {
+#define PAGE(symbol, type_, path_, ...)                                                            \
+    {.type = PAGE_##type_, .path = path_, .plain.data = page_##symbol},
+#include "server/pages/pages.def"
+};
+
+static void tag(struct page_bytes *file)
+{
+    uint8_t digest[PEN_ID_BYTES];
+    struct hash *hash = hash_create();
+    hash_add(hash, file->data, file->bytes);
+    hash_finish(hash, digest);
+    pen_id_to_hex(digest, file->tag);
+}
+
+/* As gzip (RFC 1952), kept as long as the program runs. */
+static void squeeze(struct page_file *file)
+{
+    z_stream z = {0};
+    if (deflateInit2(&z, Z_BEST_COMPRESSION, Z_DEFLATED, MAX_WBITS + 16, 8, Z_DEFAULT_STRATEGY) !=
+        Z_OK)
+        abort();
+    uLong most = deflateBound(&z, file->plain.bytes);
+    void *data = pen_alloc_zero(most, 1);
+    z.next_in = (void *)(uintptr_t)file->plain.data;
+    z.avail_in = (uInt)file->plain.bytes;
+    z.next_out = data;
+    z.avail_out = (uInt)most;
+    deflate(&z, Z_FINISH);
+    file->gzip.data = data;
+    file->gzip.bytes = z.total_out;
+    deflateEnd(&z);
+}
+
+static void prepare(void)
+{
+    const char *const ends[] = {
+#define PAGE(symbol, ...) page_##symbol##_end,
+#include "server/pages/pages.def"
+    };
+    for (int i = 0; i < PAGES; i++) {
+        files[i].plain.bytes = (size_t)(ends[i] - (const char *)files[i].plain.data);
+        squeeze(&files[i]);
+        tag(&files[i].plain);
+        tag(&files[i].gzip);
+    }
+}
+
+const struct page_file *pages_find(const char *path)
+{
+    static pthread_once_t once = PTHREAD_ONCE_INIT;
+    pthread_once(&once, prepare);
+    for (int i = 0; i < PAGES; i++)
+        if (!strcmp(files[i].path, path))
+            return &files[i];
+    return NULL;
+}

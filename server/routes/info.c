@@ -2,70 +2,73 @@
 #include "protocol/json_result.h"
 #include "protocol/json_sequence.h"
 #include "server/base/clock.h"
-#include "server/base/hash.h"
+#include "server/http/accept.h"
 #include "server/pages/pages.h"
 #include "server/routes/routes.h"
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-static bool answer_page(struct call *call, const char *text, size_t bytes, const char *scripts)
+/* Asked for again each time, and sent when it is another. */
+static bool answer_file(struct call *call, const char *path, struct pen_error *error)
 {
-    http_add_header(call->exchange, "Content-Security-Policy",
-        "default-src 'self'; style-src 'self' 'unsafe-inline'; script-src %s; img-src 'self' "
-        "blob:; "
-        "form-action 'none'; frame-ancestors 'none'; base-uri 'none'",
-        scripts);
-    http_add_header(call->exchange, "Cache-Control", "no-cache");
-    http_answer(call->exchange, 200, "text/html; charset=utf-8", http_static(text, bytes));
+    struct http_exchange *x = call->exchange;
+    const struct page_file *file = pages_find(path);
+    if (!file)
+        return pen_fail(error, PEN_NOT_FOUND, "", "There is nothing at this address.");
+    bool squeezed = accept_coding(http_header(x, "Accept-Encoding"), "gzip");
+    const struct page_bytes *sent = squeezed ? &file->gzip : &file->plain;
+    if (file->type == PAGE_HTML)
+        http_add_header(x, "Content-Security-Policy",
+            "default-src 'self'; style-src 'self' 'unsafe-inline'; script-src 'self'%s; "
+            "img-src 'self' blob: data:; "
+            "form-action 'none'; frame-ancestors 'none'; base-uri 'none'",
+            *path ? " 'unsafe-inline'" : "");
+    http_add_header(x, "Cache-Control", "no-cache");
+    http_add_header(x, "Vary", "Accept-Encoding");
+    if (call_not_modified(call, sent->tag))
+        return true;
+    if (squeezed)
+        http_add_header(x, "Content-Encoding", "gzip");
+    http_answer(x, 200, page_mime[file->type], http_static(sent->data, sent->bytes));
     return true;
 }
 
 bool route_home(struct call *call, struct pen_error *error)
 {
-    (void)error;
-    return answer_page(call, page_home, (size_t)(page_home_end - page_home), "'self'");
+    return answer_file(call, "", error);
 }
 
 bool route_docs(struct call *call, struct pen_error *error)
 {
-    (void)error;
-    return answer_page(
-        call, page_docs, (size_t)(page_docs_end - page_docs), "'self' 'unsafe-inline'");
-}
-
-/* For pages of any origin that may call; asked for again each time, and sent when it is another. */
-static bool answer_module(struct call *call, const char *text, size_t bytes)
-{
-    char tag[PEN_ID_HEX + 1];
-    uint8_t digest[PEN_ID_BYTES];
-    struct hash *hash = hash_create();
-    hash_add(hash, text, bytes);
-    hash_finish(hash, digest);
-    pen_id_to_hex(digest, tag);
-    http_add_header(call->exchange, "Cache-Control", "no-cache");
-    if (!call_not_modified(call, tag))
-        http_answer(
-            call->exchange, 200, "text/javascript; charset=utf-8", http_static(text, bytes));
-    return true;
-}
-
-bool route_home_module(struct call *call, struct pen_error *error)
-{
-    (void)error;
-    return answer_module(call, module_home, (size_t)(module_home_end - module_home));
+    return answer_file(call, "docs", error);
 }
 
 bool route_client_module(struct call *call, struct pen_error *error)
 {
-    (void)error;
-    return answer_module(call, module_client, (size_t)(module_client_end - module_client));
+    return answer_file(call, "penumbra.js", error);
 }
 
 bool route_view_module(struct call *call, struct pen_error *error)
 {
-    (void)error;
-    return answer_module(call, module_view, (size_t)(module_view_end - module_view));
+    return answer_file(call, "penumbra-view.js", error);
+}
+
+static bool answer_named(struct call *call, const char *folder, struct pen_error *error)
+{
+    char path[64];
+    snprintf(path, sizeof path, "%s%s", folder, call->address.name);
+    return answer_file(call, path, error);
+}
+
+bool route_viewer(struct call *call, struct pen_error *error)
+{
+    return answer_named(call, "viewer/", error);
+}
+
+bool route_viewer_panel(struct call *call, struct pen_error *error)
+{
+    return answer_named(call, "viewer/panels/", error);
 }
 
 bool route_openapi(struct call *call, struct pen_error *error)

@@ -1,4 +1,5 @@
 """Every address: what it answers when asked properly, and when not."""
+import gzip
 import hashlib
 import http.client
 import json
@@ -65,13 +66,34 @@ class Contract(unittest.TestCase):
             self.assertIn("Content-Security-Policy", page.headers)
 
     def test_modules(self):
-        for name, folder in (("penumbra.js", "clients/js"), ("penumbra-view.js", "clients/js"),
-                             ("home.js", "server/pages")):
-            module = self.d.get("/" + name)
-            with open(os.path.join(os.path.dirname(__file__), "../..", folder, name), "rb") as file:
-                self.assertEqual(module.body, file.read())
-            again = self.d.get("/" + name, If_None_Match=module.headers["ETag"])
-            self.assertEqual((again.status, again.body), (304, b""))
+        top = os.path.join(os.path.dirname(__file__), "../..")
+        viewer = os.path.join(top, "server/pages/viewer")
+        files = {"/" + name: os.path.join(top, "clients/js", name)
+                 for name in ("penumbra.js", "penumbra-view.js")}
+        files["/"] = os.path.join(viewer, "index.html")
+        for folder, _, names in os.walk(viewer):
+            for name in names:
+                if name != "index.html":
+                    path = os.path.join(folder, name)
+                    files["/viewer/" + os.path.relpath(path, viewer)] = path
+        for url, path in files.items():
+            with self.subTest(url=url), open(path, "rb") as file:
+                plain, text = self.d.get(url), file.read()
+                self.assertEqual(plain.body, text)
+                small = self.d.get(url, Accept_Encoding="br, gzip;q=0.5")
+                self.assertEqual(small.headers["Content-Encoding"], "gzip")
+                self.assertEqual(gzip.decompress(small.body), text)
+                self.assertIn("Accept-Encoding", small.headers["Vary"])
+                self.assertNotEqual(small.headers["ETag"], plain.headers["ETag"])
+                for coding, tag in (("", plain), ("gzip", small)):
+                    again = self.d.get(url, Accept_Encoding=coding,
+                                       If_None_Match=tag.headers["ETag"])
+                    self.assertEqual((again.status, again.body), (304, b""))
+        for refusal in ("identity", "gzip;q=0", "*;q=0", "gzip;q=0, *"):
+            answer = self.d.get("/viewer/main.js", Accept_Encoding=refusal)
+            self.assertNotIn("Content-Encoding", answer.headers, refusal)
+        for nothing in ("/viewer/nothing.js", "/viewer/panels/main.js", "/viewer/..", "/viewer/"):
+            self.problem(self.d.get(nothing), 404)
 
     def test_openapi_conditional(self):
         first = self.d.get("/openapi.json")
@@ -103,7 +125,8 @@ class Contract(unittest.TestCase):
         paths = self.d.get("/openapi.json").json()["paths"]
         for path, methods in paths.items():
             url = path.replace("{id}", self.id).replace("{name}", "pcss").replace(
-                "{number}", "0")
+                "{number}", "0").replace("panels/{file}", "panels/picture.js").replace(
+                "{file}", "main.js")
             for method, operation in methods.items():
                 content = operation["responses"].get("200", {}).get("content", {})
                 if list(content) == ["text/event-stream"]:

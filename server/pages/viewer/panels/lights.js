@@ -1,0 +1,5 @@
+import { h } from "../dom.js";
+
+export function mount(element) {
+  element.append(h("p", { class: "hint" }, "Lights are placed on the picture."));
+}

@@ -236,6 +236,14 @@ static void write_row(struct pen_json *json, const char *key, const struct pen_c
     pen_json_end(json);
 }
 
+char *pen_compared_json(const struct pen_compare *compare, const struct pen_compared *row,
+    uint32_t number, const struct pen_catalogue *catalogue)
+{
+    struct pen_json json = {0};
+    write_row(&json, NULL, row, &compare->requests[number], catalogue, number == 0);
+    return pen_json_finish(&json, NULL);
+}
+
 char *pen_compare_json(const struct pen_compare *compare, const struct pen_compared *rows,
     const char *request_id, double total_ms, const struct pen_catalogue *catalogue)
 {

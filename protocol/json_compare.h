@@ -31,3 +31,6 @@ struct pen_compared {
 /* The answer; rows[0] is the reference. */
 char *pen_compare_json(const struct pen_compare *compare, const struct pen_compared *rows,
     const char *request_id, double total_ms, const struct pen_catalogue *catalogue);
+/* One row of it alone, of the request with this number, 0 the reference. */
+char *pen_compared_json(const struct pen_compare *compare, const struct pen_compared *row,
+    uint32_t number, const struct pen_catalogue *catalogue);

@@ -63,6 +63,11 @@ static const char job_events[] =
     "data has its `frame`, `bytes`, `href`, and of the job `done` and `total`. Every event has "
     "an id: with the last one in Last-Event-ID, what came after it is sent. The stream ends "
     "with the job, and when nothing is left to tell the answer is 204.";
+static const char compare_events[] =
+    "As it is measured: `reference`, then a `method` for each, whose data is its entry of the "
+    "comparison; `done` at the end, whose data is the comparison; `problem` when it fails, whose "
+    "data is the problem document. Nothing follows `done` and `problem`. Links hold for a short "
+    "while.";
 static const char live_events[] =
     "`stats`, once a second: its data is an object with `unix_s`, `recent` (of the last ten "
     "seconds' renders how many, and `total`, the spread of their times as in /v1/stats) and "
@@ -103,6 +108,10 @@ static void write_content(struct pen_json *json, enum pen_body body)
             write_media(json, pen_format_mime[i], NULL);
         write_media(json, "application/json", SCHEMA "Comparison");
         write_media(json, "application/zip", NULL);
+        break;
+    case PEN_BODY_COMPARED:
+        write_media(json, "application/json", SCHEMA "Comparison");
+        write_events(json, compare_events);
         break;
     case PEN_BODY_EVENTS:
         write_events(json, job_events);

@@ -27,6 +27,7 @@ enum pen_body {
     PEN_BODY_PAGE,      /* HTML */
     PEN_BODY_MODULE,    /* JavaScript */
     PEN_BODY_ASSET,     /* JavaScript or CSS */
+    PEN_BODY_COMPARED,  /* a comparison, or its rows as they are measured */
     PEN_BODY_EVENTS,    /* what becomes of a job */
     PEN_BODY_LIVE,      /* what the service counts */
     PEN_BODY_FRAME,     /* an image, or the request that gives it */

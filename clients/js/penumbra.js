@@ -200,39 +200,31 @@ export class Penumbra {
       headers: { "Content-Type": "application/json", ...headers } });
   }
 
-  /**
-   * Version, device, limits.
+  /** Version, device, limits.
    * @param {Options} options
-   * @returns {Promise<Service>}
-   */
+   * @returns {Promise<Service>} */
   service({ signal } = {}) {
     return this.json("v1", { signal });
   }
 
-  /**
-   * Rolling timings per method and stage.
+  /** Rolling timings per method and stage.
    * @param {Options} options
-   * @returns {Promise<Stats>}
-   */
+   * @returns {Promise<Stats>} */
   stats({ signal } = {}) {
     return this.json("v1/stats", { signal });
   }
 
-  /**
-   * Every shadow method with its parameters.
+  /** Every shadow method with its parameters.
    * @param {Options} options
-   * @returns {Promise<TechniqueInfo[]>}
-   */
+   * @returns {Promise<TechniqueInfo[]>} */
   async techniques({ signal } = {}) {
     return (await this.json("v1/techniques", { signal })).techniques;
   }
 
-  /**
-   * The stored scenes, asked for page by page.
+  /** The stored scenes, asked for page by page.
    * @param {Options & {name?: string, tag?: string}} options `name`: only those whose name has it
    *   in it, whatever its case; `tag`: only those that have it.
-   * @returns {AsyncGenerator<Scene>}
-   */
+   * @returns {AsyncGenerator<Scene>} */
   async *scenes({ signal, name, tag } = {}) {
     for (let path = "v1/scenes" + queryOf({ limit: "100", name, tag }); path;) {
       const page = await this.json(path, { signal });
@@ -296,12 +288,10 @@ export class Penumbra {
     return this.json(path, { method: "POST", signal, ...uploadBody(data) });
   }
 
-  /**
-   * Stores an emission image for lights.
+  /** Stores an emission image for lights.
    * @param {Bytes} data PNG, JPEG or WebP.
    * @param {Options} options
-   * @returns {Promise<ImageInfo>}
-   */
+   * @returns {Promise<ImageInfo>} */
   uploadImage(data, { signal } = {}) {
     return this.json("v1/images", { method: "POST", signal, ...uploadBody(data) });
   }
@@ -339,41 +329,41 @@ export class Penumbra {
    * @returns {AsyncGenerator<{record: RenderRecord, picture: Picture, done: boolean}>}
    */
   async *refine(scene, request = {}, { signal } = {}) {
+    for await (const { event, data } of this.#follow(scene, "render", request, signal)) {
+      if (event !== "picture" && event !== "done") continue;
+      const done = event === "done";
+      let picture;
+      if (data.image.href)
+        try {
+          const image = await this.call(data.image.href, { signal });
+          picture = new Picture(await image.blob(), image.headers);
+        } catch (failure) { // a better one has taken its place
+          if (!(failure instanceof PenumbraError && failure.status === 404)) throw failure;
+        }
+      if (done) picture ??= await this.render(scene, request, { signal }); // was not kept
+      if (picture) yield { record: data, done, picture };
+    }
+  }
+
+  /** The events of an answer that ends with `done`.
+   * @returns {AsyncGenerator<ServerEvent>} */
+  async *#follow(/** @type {string} */ scene, /** @type {string} */ what, /** @type {any} */ request,
+    /** @type {AbortSignal | undefined} */ signal) {
     const leaving = new AbortController();
     const both = anySignal(signal, leaving.signal);
     try {
-      const answer = await this.#send("v1/scenes/" + scene + "/render", request, { signal: both },
+      const answer = await this.#send("v1/scenes/" + scene + "/" + what, request, { signal: both },
         { Accept: "text/event-stream" });
-      for await (const { event, data } of readEvents(answer.body)) {
-        if (event === "problem") throw new PenumbraError(data);
-        if (event !== "picture" && event !== "done") continue;
-        const done = event === "done";
-        if (data.image.href) {
-          let image;
-          try {
-            image = await this.call(data.image.href, { signal: both });
-          } catch (failure) { // a better one has taken its place
-            if (!(failure instanceof PenumbraError && failure.status === 404)) throw failure;
-          }
-          if (image) {
-            yield { record: data, done, picture: new Picture(await image.blob(), image.headers) };
-            if (done) return;
-            continue;
-          }
-        }
-        if (!done) continue;
-        // Too large to be kept, or gone by now.
-        const picture = await this.render(scene, request, { signal: both });
-        yield { record: data, done, picture };
-        return;
+      for await (const event of readEvents(answer.body)) {
+        if (event.event === "problem") throw new PenumbraError(event.data);
+        yield event;
+        if (event.event === "done") return;
       }
-      throw new PenumbraError({ title: "The answer broke off.", status: 0, retryable: true });
+      throw broken("");
     } catch (reason) {
       if (signal?.aborted) throw signal.reason;
-      if (reason instanceof TypeError)
-        throw new PenumbraError({ title: "The answer broke off: " + reason.message, status: 0,
-          retryable: true });
-      throw reason;
+      if (!(reason instanceof TypeError)) throw reason;
+      throw broken(reason.message);
     } finally {
       leaving.abort();
     }
@@ -388,6 +378,19 @@ export class Penumbra {
    */
   async compare(scene, request, { signal } = {}) {
     return (await this.#send("v1/scenes/" + scene + "/compare", request, { signal })).json();
+  }
+
+  /**
+   * The same as it is measured: "reference" and each "method", whose data is its entry of the
+   * comparison, and at the end "done", whose data is the comparison. Leaving the loop or aborting
+   * ends it.
+   * @param {string} scene Id.
+   * @param {CompareRequest} request
+   * @param {Options} options
+   * @returns {AsyncGenerator<ServerEvent>}
+   */
+  measure(scene, request, { signal } = {}) {
+    return this.#follow(scene, "compare", request, signal);
   }
 
   /**
@@ -408,12 +411,10 @@ export class Penumbra {
     return new JobHandle(this, await answer.json());
   }
 
-  /**
-   * A job that was started before.
+  /** A job that was started before.
    * @param {string} id
    * @param {Options} options
-   * @returns {Promise<JobHandle>}
-   */
+   * @returns {Promise<JobHandle>} */
   async job(id, { signal } = {}) {
     return new JobHandle(this, await this.json("v1/jobs/" + id, { signal }));
   }
@@ -485,6 +486,9 @@ function parseTimings(/** @type {string | null} */ header) {
   return Object.fromEntries([...(header ?? "").matchAll(/([\w-]+);dur=([\d.]+)/g)]
     .map(([, name, ms]) => [name, Number(ms)]));
 }
+
+const broken = (/** @type {string} */ why) => new PenumbraError({ status: 0, retryable: true,
+  title: "The answer broke off" + (why && ": " + why) + "." });
 
 async function readProblem(/** @type {Response} */ answer) {
   const problem = await answer.json().catch(() => ({}));

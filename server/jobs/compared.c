@@ -23,19 +23,34 @@ static const char *link_image(const struct compared_extra *extra, const struct c
     return row->image ? link : NULL;
 }
 
+/* With the links in place. */
+static struct pen_compared describe(const struct compared_extra *extra,
+    const struct compare_row *row, uint32_t number, char links[4][LINK_BYTES])
+{
+    struct result_cache *cache = extra->cache;
+    return (struct pen_compared){.result = &row->result,
+        .image = link_image(extra, row, number, links[0]),
+        .difference = keep(cache, row->maps[MEASURE_MAP_DIFFERENCE], links[1]),
+        .ssim_map = keep(cache, row->maps[MEASURE_MAP_SSIM], links[2]),
+        .flip_map = keep(cache, row->maps[MEASURE_MAP_FLIP], links[3])};
+}
+
+char *compared_row(const struct pen_compare *asked, const struct compare_row *rows, uint32_t number,
+    const struct compared_extra *extra)
+{
+    char links[4][LINK_BYTES];
+    struct pen_compared row = describe(extra, &rows[number], number, links);
+    return pen_compared_json(asked, &row, number, extra->catalogue);
+}
+
 char *compared_document(const struct pen_compare *asked, const struct compare_row *rows,
     const struct compared_extra *extra)
 {
     uint32_t count = 1 + asked->count;
     struct pen_compared *out = pen_alloc_zero(count, sizeof *out);
     char(*links)[4][LINK_BYTES] = pen_alloc_zero(count, sizeof *links);
-    for (uint32_t i = 0; i < count; i++) {
-        out[i].result = &rows[i].result;
-        out[i].image = link_image(extra, &rows[i], i, links[i][0]);
-        out[i].difference = keep(extra->cache, rows[i].maps[MEASURE_MAP_DIFFERENCE], links[i][1]);
-        out[i].ssim_map = keep(extra->cache, rows[i].maps[MEASURE_MAP_SSIM], links[i][2]);
-        out[i].flip_map = keep(extra->cache, rows[i].maps[MEASURE_MAP_FLIP], links[i][3]);
-    }
+    for (uint32_t i = 0; i < count; i++)
+        out[i] = describe(extra, &rows[i], i, links[i]);
     char *text = pen_compare_json(asked, out, extra->request_id, extra->total_ms, extra->catalogue);
     free(links);
     free(out);

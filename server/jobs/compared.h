@@ -14,3 +14,6 @@ struct compared_extra {
 /* malloc'd JSON; one row per request, the reference first. */
 char *compared_document(const struct pen_compare *asked, const struct compare_row *rows,
     const struct compared_extra *extra);
+/* One of its rows, 0 the reference, which must be done; malloc'd JSON. */
+char *compared_row(const struct pen_compare *asked, const struct compare_row *rows, uint32_t number,
+    const struct compared_extra *extra);

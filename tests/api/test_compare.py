@@ -1,4 +1,5 @@
 """POST /v1/scenes/{id}/compare: figures against an independent reading of the pictures, errors."""
+import http.client
 import json
 import os
 import signal
@@ -259,6 +260,66 @@ class Compare(unittest.TestCase):
         harness.wait(lambda: self.d.metric("penumbra_renders_running") == 0 and
                      self.d.metric("penumbra_queue_depth") == 0)
         self.assertLess((rendered() or 0) - before, len(slow))
+
+    def begin_events(self, body):
+        """The answer as server-sent events, and a generator of them."""
+        connection = http.client.HTTPConnection("127.0.0.1", self.d.port,
+                                                timeout=60 * harness.PATIENCE)
+        self.addCleanup(connection.close)
+        connection.request("POST", "/v1/scenes/%s/compare" % self.id, json.dumps(body),
+                           {"Content-Type": "application/json", "Accept": "text/event-stream"})
+        answer = connection.getresponse()
+
+        def events():
+            kind = None
+            for line in answer:
+                field, _, value = line.decode().rstrip("\n").partition(": ")
+                if field == "event":
+                    kind = value
+                elif field == "data":
+                    yield kind, json.loads(value)
+        return connection, answer, events()
+
+    def test_events(self):
+        """The rows of the comparison, one after the other, and it."""
+        body = {**VIEW, "techniques": ["hard", "pcss", "vsm"], "reference": REFERENCE}
+        _, answer, events = self.begin_events(body)
+        self.assertEqual((answer.status, answer.headers["Content-Type"]), (200, "text/event-stream"))
+        told = list(events)
+        self.assertEqual([kind for kind, _ in told], ["reference"] + 3 * ["method"] + ["done"])
+        whole = told[-1][1]
+        self.assertEqual([data for _, data in told[:-1]], [whole["reference"]] + whole["methods"])
+        figures = [{k: m[k] for k in ("rmse", "rmse_penumbra", "ssim", "flip", "links")}
+                   for m in whole["methods"]]
+        again = self.compare(body)
+        self.assertEqual(figures, [{k: m[k] for k in figures[0]} for m in again["methods"]])
+        self.assertEqual(sorted(whole), sorted(again))
+
+    def test_events_refused(self):
+        """Before the first picture an error is a plain answer, after it an event."""
+        _, answer, _ = self.begin_events({**VIEW, "techniques": ["nothing-like-it"]})
+        self.assertEqual(answer.status, 422)
+        slow = [{"name": "multisample", "params": {"samples": 1024 - n}} for n in range(20)]
+        _, answer, events = self.begin_events({**VIEW, "techniques": slow, "reference": "none"})
+        self.assertEqual((answer.status, next(events)[0]), (200, "reference"))
+        self.assertEqual(self.d.call("DELETE", "/v1/scenes/" + self.id).status, 204)
+        told = list(events)
+        self.d.upload(caster_scene())
+        self.assertEqual(told[-1][0], "problem")
+        self.assertEqual(told[-1][1]["status"], 404)
+
+    def test_events_left(self):
+        """Rows are there before the last is measured; when the reader goes, the rest is not."""
+        slow = [{"name": "multisample", "params": {"samples": 1024 - n}} for n in range(20)]
+        abandoned = self.d.metric("penumbra_renders_abandoned_total")
+        connection, answer, events = self.begin_events(
+            {**VIEW, "techniques": slow, "reference": "none"})
+        self.assertEqual([next(events)[0] for _ in range(2)], ["reference", "method"])
+        answer.close()
+        connection.close()
+        harness.wait(lambda: self.d.metric("penumbra_renders_abandoned_total") == abandoned + 1)
+        harness.wait(lambda: self.d.metric("penumbra_renders_running") == 0 and
+                     self.d.metric("penumbra_queue_depth") == 0)
 
     def test_worker_dies(self):
         """A measurement is given to the next worker, like any render."""

@@ -49,8 +49,8 @@ static bool round_of(struct scrubber *s, enum store_kind kind)
         uint64_t start = clock_now_ns();
         memcpy(after, entry.id, PEN_ID_BYTES);
         scene_store_scrub(s->store, kind, entry.id);
-        free(
-            describe_stored(s->store, kind, entry.id, false, NULL)); /* mends what it cannot read */
+        const struct store_now now = {0};
+        free(describe_stored(s->store, kind, entry.id, &now, NULL)); /* mends what it cannot read */
         if (!rest(s, REST * (clock_now_ns() - start)))
             return false;
     }

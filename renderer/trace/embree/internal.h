@@ -1,6 +1,7 @@
 /* What the files of this folder share. */
 #pragma once
 #include "renderer/trace/embree/embree.h"
+#include "renderer/trace/parallel.h"
 #include "renderer/trace/points.h"
 #include "renderer/trace/trace.h"
 #include <stdatomic.h>
@@ -138,21 +139,6 @@ bool trace_check_device(struct pen_trace_scene *scene, struct pen_error *error);
 /* Alpha at a point of triangle `primitive`; u, v as Embree gives them. */
 float trace_alpha_at(const struct trace_alpha *alpha, uint32_t primitive, float u, float v);
 
-/* run(context, item) is to be called for every item below `count`. */
-struct trace_work {
-    void (*run)(void *context, uint32_t item);
-    void *context;
-    uint32_t count;
-    /* As pen_trace_job has them; NULL: it is done in one go. */
-    bool (*turn)(void *context);
-    double turn_ms;
-    /* Called first, while the other threads are at it already; false as from `turn`. May be NULL. */
-    bool (*beside)(void *context, struct pen_trace_crew *crew);
-};
-/* On `threads` threads, the caller's among them, with denormals flushed. Adds their processor time to
- * *cpu_seconds. False: a turn said so, and items are left out. */
-bool trace_parallel(uint32_t threads, const struct trace_work *work, double *cpu_seconds);
-
 /* A job's work on the tiles of its picture: what it works on begins with this. */
 struct trace_pieces {
     struct pen_trace_scene *scene;
@@ -167,9 +153,6 @@ struct trace_pieces {
 bool trace_in_pieces(
     struct trace_pieces *pieces, uint32_t tiles, void (*work)(void *context, uint32_t item));
 bool trace_is_late(struct trace_pieces *pieces); /* also by the job's deadline */
-/* `threads`, or how many this process may use when that is 0. */
-uint32_t trace_thread_count(uint32_t threads);
-double trace_seconds(void);
 
 static inline float trace_dot(const float a[3], const float b[3])
 {

@@ -1,5 +1,4 @@
-/* Threads over numbered items. */
-#include "renderer/trace/embree/internal.h"
+#include "renderer/trace/parallel.h"
 #include "protocol/container.h"
 #include <pthread.h>
 #include <sched.h>

@@ -1,5 +1,6 @@
 #include "renderer/edges/edge_light.h"
 #include "protocol/srgb.h"
+#include "renderer/trace/parallel.h"
 #include <math.h>
 #include <string.h>
 
@@ -231,49 +232,90 @@ static uint32_t wanted_pixels(const struct edge_rows *e, bool all, uint32_t x, u
     return all ? bits : shown_pixels(e, x, y, bits);
 }
 
+static uint32_t tiles_across(const struct edge_rows *e)
+{
+    return (e->view->width + COVER_TILE - 1) / COVER_TILE;
+}
+
+/* What threads do with rows of tiles, and between which rows. */
+struct rows_work {
+    const struct edge_rows *e;
+    struct cover_tile *tiles;
+    const struct cover_tile *all;
+    uint32_t first;
+    bool any;
+};
+
+static void in_rows(struct rows_work *rows, uint32_t end, void (*run)(void *context, uint32_t item))
+{
+    uint32_t count = (end - rows->first + COVER_TILE - 1) / COVER_TILE;
+    const struct trace_work work = {run, rows, count, NULL, 0, NULL};
+    double cpu_seconds = 0;
+    trace_parallel(trace_thread_count(0), &work, &cpu_seconds);
+}
+
+static void find_row(void *context, uint32_t item)
+{
+    const struct rows_work *rows = context;
+    uint32_t y = rows->first + item * COVER_TILE, across = tiles_across(rows->e);
+    for (uint32_t column = 0; column < across; column++)
+        rows->tiles[y / COVER_TILE * across + column] = (struct cover_tile){
+            .pixels = wanted_pixels(rows->e, rows->any, column * COVER_TILE, y)};
+}
+
 uint32_t edge_find(const struct edge_rows *e, bool all, struct cover_tile *tiles)
 {
-    uint32_t across = (e->view->width + COVER_TILE - 1) / COVER_TILE, slots = 0;
-    for (uint32_t y = e->first; y < e->first + e->rows; y += COVER_TILE)
-        for (uint32_t column = 0; column < across; column++) {
-            struct cover_tile *tile = &tiles[y / COVER_TILE * across + column];
-            *tile = (struct cover_tile){.pixels = wanted_pixels(e, all, column * COVER_TILE, y)};
-            if (tile->pixels)
-                tile->slot = slots++;
-        }
+    struct rows_work rows = {.e = e, .tiles = tiles, .first = e->first, .any = all};
+    uint32_t across = tiles_across(e), slots = 0, end = e->first + e->rows;
+    in_rows(&rows, end, find_row);
+    struct cover_tile *last = &tiles[(end + COVER_TILE - 1) / COVER_TILE * across];
+    for (struct cover_tile *tile = &tiles[e->first / COVER_TILE * across]; tile < last; tile++)
+        if (tile->pixels)
+            tile->slot = slots++;
     return slots;
 }
 
-void edge_begin(const struct edge_rows *e, struct cover_tile *tiles, cover_places *places)
+void edge_begin(
+    const struct edge_rows *e, struct cover_tile *tiles, cover_places *places, float *leasts)
 {
-    uint32_t across = (e->view->width + COVER_TILE - 1) / COVER_TILE;
+    uint32_t across = tiles_across(e);
     for (uint32_t y = e->first; y < e->first + e->rows; y += COVER_TILE)
         for (uint32_t column = 0; column < across; column++) {
             struct cover_tile *tile = &tiles[y / COVER_TILE * across + column];
             cover_places *at = places + (size_t)tile->slot * COVER_PIXELS;
+            float *of_pixel = leasts + (size_t)tile->slot * COVER_PIXELS;
             four far[COVER_TILE];
             if (!tile->pixels)
                 continue;
             farthest_around(e, column * COVER_TILE, y, far);
             tile->farthest = 1;
+            for (uint32_t i = 0; i < COVER_PIXELS; i++)
+                of_pixel[i] = INFINITY;
             for (uint32_t left = tile->pixels; left; left &= left - 1) {
                 uint32_t bit = (uint32_t)__builtin_ctz(left);
                 float least = BEHIND * far[bit / COVER_TILE][bit % COVER_TILE];
                 at[bit] = all(least);
+                of_pixel[bit] = least;
                 tile->farthest = least < tile->farthest ? least : tile->farthest;
             }
         }
 }
 
+static void choose_row(void *context, uint32_t item)
+{
+    const struct rows_work *rows = context;
+    uint32_t y = rows->first + item * COVER_TILE, across = tiles_across(rows->e);
+    for (uint32_t column = 0; column < across; column++) {
+        uint32_t i = y / COVER_TILE * across + column;
+        rows->tiles[i] = rows->all[i];
+        rows->tiles[i].pixels = shown_pixels(rows->e, column * COVER_TILE, y, rows->all[i].pixels);
+    }
+}
+
 void edge_choose(const struct edge_rows *e, const struct cover_tile *all, struct cover_tile *tiles)
 {
-    uint32_t across = (e->view->width + COVER_TILE - 1) / COVER_TILE;
-    for (uint32_t y = e->first; y < e->first + e->rows; y += COVER_TILE)
-        for (uint32_t column = 0; column < across; column++) {
-            uint32_t i = y / COVER_TILE * across + column;
-            tiles[i] = all[i];
-            tiles[i].pixels = shown_pixels(e, column * COVER_TILE, y, all[i].pixels);
-        }
+    struct rows_work rows = {.e = e, .tiles = tiles, .all = all, .first = e->first};
+    in_rows(&rows, e->first + e->rows, choose_row);
 }
 
 static float dot(const float a[3], const float b[3])
@@ -437,18 +479,25 @@ static void blend_pixel(struct around *a, uint32_t x, uint32_t y, size_t slot)
     store_light(e, x, y, light);
 }
 
-void edge_blend(const struct edge_rows *e, const struct cover_tile *tiles, uint32_t y)
+static void blend_row(void *context, uint32_t item)
 {
-    uint32_t across = (e->view->width + COVER_TILE - 1) / COVER_TILE;
-    make_tables();
+    const struct rows_work *rows = context;
+    uint32_t y = rows->first + item * COVER_TILE, across = tiles_across(rows->e);
     for (uint32_t column = 0; column < across; column++) {
-        const struct cover_tile *tile = &tiles[y / COVER_TILE * across + column];
+        const struct cover_tile *tile = &rows->tiles[y / COVER_TILE * across + column];
         struct around around;
-        around.e = e, around.x = column * COVER_TILE, around.y = y, around.known = 0;
+        around.e = rows->e, around.x = column * COVER_TILE, around.y = y, around.known = 0;
         for (uint32_t left = tile->pixels; left; left &= left - 1) {
             uint32_t bit = (uint32_t)__builtin_ctz(left);
             blend_pixel(&around, around.x + bit % COVER_TILE, y + bit / COVER_TILE,
                 (size_t)tile->slot * COVER_PIXELS + bit);
         }
     }
+}
+
+void edge_blend(const struct edge_rows *e, struct cover_tile *tiles, uint32_t first, uint32_t end)
+{
+    struct rows_work rows = {.e = e, .tiles = tiles, .first = first};
+    make_tables();
+    in_rows(&rows, end, blend_row);
 }

@@ -32,11 +32,12 @@ void edge_pad(const struct edge_rows *e, float *depths);
 /* Fills the tiles of the rows with what this picture shows edges in or, `all`, any that there is of what was
  * drawn. Returns how many slots they have: one each where places are wanted. */
 uint32_t edge_find(const struct edge_rows *e, bool all, struct cover_tile *tiles);
-/* Before anything is drawn: at each place what has to be nearer. */
-void edge_begin(const struct edge_rows *e, struct cover_tile *tiles, cover_places *places);
+/* Before anything is drawn: at each place, and of each pixel, what has to be nearer. */
+void edge_begin(
+    const struct edge_rows *e, struct cover_tile *tiles, cover_places *places, float *leasts);
 /* Of `all` tiles what this picture shows. */
 void edge_choose(const struct edge_rows *e, const struct cover_tile *all, struct cover_tile *tiles);
-/* One row of tiles, from row y on. */
-void edge_blend(const struct edge_rows *e, const struct cover_tile *tiles, uint32_t y);
+/* Rows of the picture, whole tiles but for the last ones. */
+void edge_blend(const struct edge_rows *e, struct cover_tile *tiles, uint32_t first, uint32_t end);
 /* Bytes of a pixel. */
 uint32_t edge_pixel_bytes(const struct pen_plane *plane);

@@ -14,7 +14,8 @@
 
 _Static_assert(OPEN_TILE == 4 && COVER_TILE == 4, "edge_tiles.frag looks at so many");
 
-#define BAND_PIXELS (4u << 20) /* whose places are in memory together: 64 MiB at most */
+#define BLEND_PIXELS (1u << 16) /* between two turns */
+#define BAND_PIXELS (4u << 20)  /* whose places are in memory together: 64 MiB at most */
 
 bool frame_edges_are_smooth(const struct frame_job *job)
 {
@@ -252,18 +253,22 @@ static bool cover_band(struct band *b, uint32_t slots, struct pen_error *error)
     const struct frame_job *job = b->job;
     struct edge_rows *e = &b->rows;
     size_t places = (size_t)slots * COVER_PIXELS;
+    const struct places_pass passes[] = {
+        {e->layered ? PLACES_SOLID : PLACES_ALL, job->request->ground.on, e->first, e->rows},
+        {PLACES_BLENDED, false, e->first, e->rows}};
+    float *least = pen_alloc(places, sizeof *least);
+    bool ok = true;
     free_places(b);
-    struct places_pass solid = {e->layered ? PLACES_SOLID : PLACES_ALL, job->request->ground.on,
-                           e->first, e->rows},
-                       front = {PLACES_BLENDED, false, e->first, e->rows};
-    e->solid.places = b->places[0] = pen_alloc(places, sizeof **b->places);
-    e->front.places = b->places[1] = e->layered ? pen_alloc(places, sizeof **b->places) : NULL;
-    edge_begin(e, b->tiles, b->places[0]);
-    if (e->layered)
-        memcpy(b->places[1], b->places[0], places * sizeof **b->places);
-    return pass_cover(job->ctx, job->scene, e->view, &solid, b->tiles, b->places[0], error) &&
-           (!e->layered ||
-               pass_cover(job->ctx, job->scene, e->view, &front, b->tiles, b->places[1], error));
+    for (int i = 0; ok && i < 1 + e->layered; i++) {
+        b->places[i] = pen_alloc(places, sizeof **b->places);
+        edge_begin(e, b->tiles, b->places[i], least);
+        ok = pass_cover(
+            job->ctx, job->scene, e->view, &passes[i], b->tiles, b->places[i], least, error);
+    }
+    e->solid.places = b->places[0];
+    e->front.places = b->places[1];
+    free(least);
+    return ok;
 }
 
 static bool blend_band(struct band *b, struct pen_error *error)
@@ -272,8 +277,10 @@ static bool blend_band(struct band *b, struct pen_error *error)
     const struct edge_rows *e = &b->rows;
     bool ok = true;
     gl_timer_begin(&ctx->timer, PEN_STAGE_SHADE, "edges");
-    for (uint32_t y = e->first; ok && y < e->first + e->rows; y += OPEN_TILE) {
-        edge_blend(e, b->tiles, y);
+    uint32_t end = e->first + e->rows;
+    uint32_t most = (BLEND_PIXELS / e->view->width / OPEN_TILE + 1) * OPEN_TILE;
+    for (uint32_t y = e->first; ok && y < end; y += most) {
+        edge_blend(e, b->tiles, y, end - y < most ? end : y + most);
         ok = pass_turn_inside(ctx, error);
     }
     gl_timer_end(&ctx->timer);

@@ -64,13 +64,16 @@ static void cover_ground(const struct scene *scene, const struct cover *cover)
 }
 
 bool pass_cover(struct technique_ctx *ctx, struct scene *scene, const struct view *view,
-    const struct places_pass *which, const struct cover_tile *tiles, cover_places *depths,
+    const struct places_pass *which, struct cover_tile *tiles, cover_places *depths, float *least,
     struct pen_error *error)
 {
     const struct cover_scene what = {.blended = which->kind == PLACES_BLENDED,
         .threshold = which->kind == PLACES_SOLID ? SOLID_PER_MILLE / 1000.0f : 0};
-    struct cover cover = {
-        .width = view->width, .height = view->height, .tiles = tiles, .depths = depths};
+    struct cover cover = {.width = view->width,
+        .height = view->height,
+        .tiles = tiles,
+        .depths = depths,
+        .least = least};
     struct pass_bands bands;
     bool more = true, ok = true;
     memcpy(cover.world_to_clip, view->world_to_clip, sizeof cover.world_to_clip);

@@ -23,5 +23,5 @@ bool pass_places(struct technique_ctx *ctx, struct scene *scene, const struct vi
 /* The same, drawn by the CPU, of what these tiles want. Software rasterisers take longer for each
  * triangle, and for all the pixels of which nobody asks. */
 bool pass_cover(struct technique_ctx *ctx, struct scene *scene, const struct view *view,
-    const struct places_pass *which, const struct cover_tile *tiles, cover_places *depths,
+    const struct places_pass *which, struct cover_tile *tiles, cover_places *depths, float *least,
     struct pen_error *error);

@@ -1,5 +1,5 @@
-# Writes PAGE, the manual of the program NAME in SECTION, from the --help of PROGRAM and of each of its
-# COMMANDS: whatever a program says of itself is written once. cmake -DPROGRAM=... -P manual.cmake
+# Writes PAGE, the manual of the program NAME in SECTION, from the --help of PROGRAM: whatever a program
+# says of itself is written once. cmake -DPROGRAM=... -P manual.cmake
 # Text for roff; hyphens as they are typed, and no line a request.
 function(roff text out)
     string(REPLACE "\\" "\\e" text "${text}")
@@ -8,11 +8,11 @@ function(roff text out)
     set(${out} "${text}" PARENT_SCOPE)
 endfunction()
 
-# What "PROGRAM [command] --help" prints, as a block that keeps its lines.
+# What "PROGRAM --help" prints, as a block that keeps its lines.
 function(help out)
-    execute_process(COMMAND ${PROGRAM} ${ARGN} --help OUTPUT_VARIABLE text RESULT_VARIABLE status)
+    execute_process(COMMAND ${PROGRAM} --help OUTPUT_VARIABLE text RESULT_VARIABLE status)
     if(status)
-        message(FATAL_ERROR "${NAME} ${ARGN} --help ends with ${status}")
+        message(FATAL_ERROR "${NAME} --help ends with ${status}")
     endif()
     roff("${text}" text)
     set(${out} ".nf\n${text}.fi\n" PARENT_SCOPE)
@@ -23,10 +23,5 @@ roff("${SUMMARY}" summary)
 help(text)
 set(page ".TH ${NAME} ${SECTION} \"\" \"penumbra ${VERSION}\"\n.SH NAME\n${name} \\- ${summary}\n")
 string(APPEND page ".SH DESCRIPTION\n${text}")
-foreach(command IN LISTS COMMANDS)
-    help(text ${command})
-    string(TOUPPER "${command}" title)
-    string(APPEND page ".SH ${title}\n${text}")
-endforeach()
-string(APPEND page ".SH SEE ALSO\n.BR penumbra (1),\n.BR penumbrad (8)\n")
+string(APPEND page ".SH SEE ALSO\n.BR penumbra (1)\n")
 file(WRITE ${PAGE} "${page}")

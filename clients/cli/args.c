@@ -1,4 +1,5 @@
 #include "clients/cli/cli.h"
+#include "protocol/limits.h"
 #include <math.h>
 #include <stdarg.h>
 #include <stdlib.h>
@@ -89,45 +90,6 @@ void cli_server_init(struct cli_server *server)
         server->base, sizeof server->base, "%s", base && *base ? base : "http://127.0.0.1:8080");
 }
 
-bool cli_common_option(struct cli_args *args, struct cli_server *server)
-{
-    const char *value;
-    if (cli_option(args, "server", &value))
-        snprintf(server->base, sizeof server->base, "%s", value);
-    else if (cli_option(args, "retry", &value)) {
-        char *end;
-        long retries = strtol(value, &end, 10);
-        if (!*value || *end || retries < 0 || retries > 1000)
-            args->status = cli_fail(CLI_USAGE, "--retry takes a whole number from 0 to 1000.");
-        server->retries = (int)retries;
-    } else if (cli_flag(args, "v"))
-        server->verbose = true;
-    else
-        return false;
-    return true;
-}
-
-bool cli_words(struct cli_args *args, const struct cli_words *words)
-{
-    const char *word;
-    int count = 0;
-    cli_server_init(words->server);
-    while (args->at < args->count && args->status == CLI_OK) {
-        if (cli_common_option(args, words->server))
-            continue;
-        if (cli_flag(args, "json"))
-            *words->json = true;
-        else if (cli_flag(args, "help") || cli_flag(args, "h")) {
-            args->status = fputs(words->help, stdout) < 0 ? CLI_FAILED : CLI_OK;
-            return false;
-        } else if (count < words->room && (word = cli_positional(args)))
-            words->words[count++] = word;
-        else
-            args->status = cli_unknown(args, words->command);
-    }
-    return args->status == CLI_OK;
-}
-
 /* A finite number in the notation of JSON, or close to it, and nothing else. */
 static bool is_number(const char *text, double *number)
 {
@@ -167,4 +129,16 @@ cJSON *cli_guess(const char *text)
     if (strchr(text, ',') && (array = guess_vector(text)))
         return array;
     return cJSON_CreateString(text);
+}
+
+bool cli_is_id(const char *text)
+{
+    return strlen(text) == PEN_ID_HEX && cli_is_prefix(text);
+}
+
+bool cli_is_prefix(const char *text)
+{
+    size_t digits = strlen(text);
+    return digits >= PEN_ID_PREFIX && digits <= PEN_ID_HEX &&
+           strspn(text, "0123456789abcdef") == digits;
 }

@@ -33,38 +33,17 @@ const char *cli_positional(struct cli_args *args);
 /* Reports the current argument as unknown; `command` is named in the hint. */
 int cli_unknown(const struct cli_args *args, const char *command);
 
-/* Where and how to call; filled by cli_common_option. */
+/* Where and how to call. */
 struct cli_server {
     char base[512]; /* no trailing slash */
     int retries;    /* after 429 and 503 */
     bool verbose;
 };
 void cli_server_init(struct cli_server *server);
-/* Consumes --server, --retry and -v. */
-bool cli_common_option(struct cli_args *args, struct cli_server *server);
 
-/* What a command takes that has words, --json and the common options. */
-struct cli_words {
-    const char *command, *help;
-    const char **words; /* kept where none is given */
-    int room;
-    struct cli_server *server;
-    bool *json;
-};
-/* False: there is nothing to do but to return args->status (help was printed, or something is
- * wrong). */
-bool cli_words(struct cli_args *args, const struct cli_words *words);
-
-int cli_render(struct cli_args *args);
-int cli_compare(struct cli_args *args);
-int cli_scenes(struct cli_args *args);
-int cli_sequence(struct cli_args *args);
-int cli_jobs(struct cli_args *args);
-int cli_techniques(struct cli_args *args);
-int cli_generate(struct cli_args *args);
-/* What "render --help" lists: every flag that comes from a parameter row. */
-void cli_render_help(void);
-void cli_sequence_help(void);
+/* True for 64 lower-case hexadecimal digits, an id; for as many as may stand for one, or all. */
+bool cli_is_id(const char *text);
+bool cli_is_prefix(const char *text);
 
 /* Typed guess: true, false, a number, numbers joined by commas, else a string. */
 cJSON *cli_guess(const char *text);

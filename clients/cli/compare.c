@@ -1,40 +1,31 @@
+#include "clients/cli/output.h"
 #include "clients/cli/render.h"
 #include "clients/cli/request_args.h"
+#include "clients/cli/rows/command.h"
+#include "clients/cli/rows/parse.h"
 #include "clients/cli/upload.h"
-#include <errno.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 
 #define DEADLINE_MS 600000
 
-static void help(void)
-{
-    puts(
-        "penumbra compare SCENE [--techniques all|NAME,NAME...] [options]\n"
-        "\n"
-        "Renders a view with several shadow methods and with a reference, and prints how far they\n"
-        "are from it (rmse: of the mean visibility; penumbra: the same where the reference lies\n"
-        "between 0.02 and 0.98; ssim, flip: of the picture) and what they cost in milliseconds\n"
-        "(shadow: its inputs and the method; total: with G-buffer and shading; nothing cached).\n"
-        "SCENE is as for penumbra render.\n"
-        "\n"
-        "  --techniques LIST                  all (default), or names joined by commas\n"
-        "  --reference NAME                   default: raytraced with 1024 samples\n"
-        "  --out DIR                          writes images, difference images, SSIM and FLIP\n"
-        "                                     maps and comparison.json there\n"
-        "  --json FILE                        the comparison as JSON (-: standard input); flags\n"
-        "                                     after it change it; techniques can have params here\n"
-        "  --json-record                      prints the server's answer instead of the table\n"
-        "  --light NAME=VALUE,NAME=VALUE...   adds a light; none: ambient light only\n"
-        "  --server URL, --retry N, -v        as for penumbra render\n");
-    cli_render_help();
-}
-
 struct options {
-    struct cli_server server;
-    const char *scene, *out;
-    bool record, help;
+    struct cli_common common;
+    const char *techniques, *reference, *out;
+    bool record;
+};
+
+static const struct cli_row compare_rows[] = {
+    {"techniques", "LIST", "all, or names joined by commas; default: all.", CLI_OFFER_TECHNIQUES,
+        .offset = offsetof(struct options, techniques)},
+    {"reference", "NAME", "What is compared with; default: raytraced with 1024 samples.",
+        CLI_OFFER_TECHNIQUES, .offset = offsetof(struct options, reference)},
+    {"out", "DIR",
+        "Writes images, difference images, SSIM and FLIP maps and comparison.json there.",
+        CLI_OFFER_FOLDERS, .offset = offsetof(struct options, out)},
+    {"json-record", NULL, "Prints the server's answer instead of the table.",
+        .offset = offsetof(struct options, record)},
+    {0},
 };
 
 static void put_string(cJSON *root, const char *key, const char *value)
@@ -56,39 +47,6 @@ static void put_list(cJSON *root, const char *names)
         if (*name)
             cJSON_AddItemToArray(list, cJSON_CreateString(name));
     free(copy);
-}
-
-static int parse(struct cli_args *args, struct options *options, cJSON *root)
-{
-    cli_server_init(&options->server);
-    while (args->at < args->count && args->status == CLI_OK) {
-        const char *value;
-        if (cli_common_option(args, &options->server) || cli_option(args, "out", &options->out))
-            continue;
-        if (cli_option(args, "techniques", &value)) {
-            if (args->status == CLI_OK)
-                put_list(root, value);
-        } else if (cli_option(args, "reference", &value)) {
-            if (args->status == CLI_OK)
-                put_string(root, "reference", value);
-        } else if (cli_flag(args, "json-record"))
-            options->record = true;
-        else if (cli_flag(args, "help") || cli_flag(args, "h"))
-            options->help = true;
-        else if (cli_request_option(args, root))
-            continue;
-        else if (!options->scene && (value = cli_positional(args)))
-            options->scene = value;
-        else
-            return cli_unknown(args, "compare");
-    }
-    if (args->status != CLI_OK || options->help)
-        return args->status;
-    if (!options->scene)
-        return cli_fail(CLI_USAGE, "Which scene? See penumbra compare --help.");
-    if (!cli_request_has(root, NULL, "deadline_ms"))
-        cJSON_AddNumberToObject(root, "deadline_ms", DEADLINE_MS);
-    return CLI_OK;
 }
 
 /* ---- the table ---- */
@@ -179,19 +137,10 @@ static int save_row(const struct options *options, const cJSON *row, int number)
             .path = href->valuestring,
             .accept = "image/png",
             .doing = "fetching pictures"};
-        status = cli_save_image(&options->server, &call, path);
+        status = cli_save_image(&options->common.server, &call, path);
         free(path);
     }
     return status;
-}
-
-/* Before the comparison, which may take minutes. */
-static int make_folder(const char *path)
-{
-    struct stat status;
-    if (!mkdir(path, 0777) || (errno == EEXIST && !stat(path, &status) && S_ISDIR(status.st_mode)))
-        return CLI_OK;
-    return cli_fail(CLI_FAILED, "%s cannot be made.", path);
 }
 
 static bool has_pictures(const cJSON *row)
@@ -206,11 +155,11 @@ static int save_all(const struct options *options, const cJSON *answer, const ch
         fputs(
             "warning: the server kept no pictures: its result cache is off or too small\n", stderr);
     char *path = cli_format("%s/comparison.json", options->out);
-    FILE *file = fopen(path, "wb");
-    bool ok = file && fputs(json, file) >= 0;
-    if (file && fclose(file))
-        ok = false;
-    int status = ok ? CLI_OK : cli_fail(CLI_FAILED, "%s cannot be written.", path);
+    struct cli_output output;
+    int status = cli_output_open(&output, path);
+    if (status == CLI_OK)
+        fputs(json, output.file);
+    status = cli_output_end(&output, status);
     free(path);
     if (status == CLI_OK)
         status = save_row(options, member(answer, "reference"), 0);
@@ -223,11 +172,12 @@ static int save_all(const struct options *options, const cJSON *answer, const ch
 
 static int compare(const struct options *options, cJSON *root)
 {
-    const struct cli_server *server = &options->server;
+    const struct cli_server *server = &options->common.server;
     char id[PEN_ID_HEX + 1];
-    int status = options->out ? make_folder(options->out) : CLI_OK;
+    /* Before the comparison, which may take minutes. */
+    int status = options->out ? cli_output_folder(options->out) : CLI_OK;
     if (status == CLI_OK)
-        status = cli_upload_scene(server, options->scene, id, NULL);
+        status = cli_upload_scene(server, options->common.words[0], id, NULL);
     if (status == CLI_OK)
         status = cli_upload_textures(server, root);
     if (status != CLI_OK)
@@ -256,15 +206,40 @@ static int compare(const struct options *options, cJSON *root)
     return status;
 }
 
-int cli_compare(struct cli_args *args)
+static int run(const struct cli_command *command, struct cli_args *args)
 {
     struct options options = {0};
     cJSON *root = cJSON_CreateObject();
-    int status = parse(args, &options, root);
-    if (status == CLI_OK && options.help)
-        help();
-    else if (status == CLI_OK)
+    int status = cli_parse(command, args, &options, root);
+    if (status == CLI_OK && !options.common.help && !options.common.count)
+        status = cli_fail(CLI_USAGE, "Which scene? See penumbra compare --help.");
+    if (status == CLI_OK && !options.common.help) {
+        if (options.techniques)
+            put_list(root, options.techniques);
+        if (options.reference)
+            put_string(root, "reference", options.reference);
+        if (!cli_request_has(root, NULL, "deadline_ms"))
+            cJSON_AddNumberToObject(root, "deadline_ms", DEADLINE_MS);
         status = compare(&options, root);
+    }
     cJSON_Delete(root);
     return status;
 }
+
+const struct cli_command cli_compare = {.name = "compare",
+    .summary = "measures shadow methods against a reference",
+    .words = "SCENE",
+    .about =
+        "Renders a view with several shadow methods and with a reference, and prints how far they "
+        "are "
+        "from it (rmse: of the mean visibility; penumbra: the same where the reference lies "
+        "between "
+        "0.02 and 0.98; ssim, flip: of the picture) and what they cost in milliseconds (shadow: "
+        "its "
+        "inputs and the method; total: with G-buffer and shading; nothing cached). With --json a "
+        "comparison, in which techniques can have params.\n" CLI_ABOUT_SCENE,
+    .rows = compare_rows,
+    .offer = CLI_OFFER_SCENES,
+    .requests = CLI_RENDER_REQUEST,
+    .most_words = 1,
+    .run = run};

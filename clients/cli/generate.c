@@ -1,102 +1,103 @@
-#include "clients/cli/cli.h"
+#include "clients/cli/output.h"
+#include "clients/cli/rows/command.h"
+#include "clients/cli/rows/parse.h"
 #include "protocol/param.h"
 #include "renderer/generate/generate.h"
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
-static void help(void)
-{
-    puts("penumbra generate KIND -o FILE [options]\n"
-         "\n"
-         "Makes a scene: a .glb to upload, or a .pscene for the renderer's own tools.\n"
-         "\n"
-         "  --triangles N         about so many (hairball, foliage, columns)\n"
-         "  --seed N              another scene of the same kind\n"
-         "  --caster-height M     metres above the receiver\n"
-         "  --caster-half-size M  square caster\n"
-         "  --second-height M     lower caster (stacked, duplicate)\n"
-         "\n"
-         "Kinds:");
-    for (int i = 0; i < PEN_GENERATED_KINDS; i++)
-        printf("  %s\n", pen_generated_names[i]);
-}
+struct options {
+    struct cli_common common;
+    const char *output;
+    struct pen_generated_options scene;
+};
 
-/* Consumes --name with a number from min to max. */
-static bool number_option(
-    struct cli_args *args, const char *name, double min, double max, bool whole, double *number)
+/* A number from min to max; reports what else it is. */
+static bool read_number(
+    const char *name, const char *value, double min, double max, bool whole, double *number)
 {
-    const char *value;
     char *end;
-    if (!cli_option(args, name, &value))
-        return false;
     *number = strtod(value, &end);
-    if (!args->status && (end == value || *end || !(*number >= min && *number <= max) ||
-                             (whole && *number != (double)(uint64_t)*number)))
-        args->status = cli_fail(CLI_USAGE, "--%s takes a %snumber from %g to %g.", name,
-            whole ? "whole " : "", min, max);
-    return true;
+    if (end != value && !*end && *number >= min && *number <= max &&
+        (!whole || *number == (double)(uint64_t)*number))
+        return true;
+    cli_fail(
+        CLI_USAGE, "--%s takes a %snumber from %g to %g.", name, whole ? "whole " : "", min, max);
+    return false;
 }
+
+/* A function that takes one number of the scene. */
+#define TAKES(field, name, type, min, max, whole)                                                  \
+    static bool take_##field(struct cli_args *args, void *options, const char *value)              \
+    {                                                                                              \
+        double number;                                                                             \
+        (void)args;                                                                                \
+        if (!read_number(name, value, min, max, whole, &number))                                   \
+            return false;                                                                          \
+        ((struct options *)options)->scene.field = (type)number;                                   \
+        return true;                                                                               \
+    }
+TAKES(triangles, "triangles", uint32_t, 1, 3e6, true)
+TAKES(seed, "seed", uint32_t, 0, 4294967295.0, true)
+TAKES(caster_height, "caster-height", float, 1e-3, 1e3, false)
+TAKES(caster_half_size, "caster-half-size", float, 1e-3, 1e3, false)
+TAKES(second_height, "second-height", float, 1e-3, 1e3, false)
+#undef TAKES
+
+static const struct cli_row generate_rows[] = {
+    {"o", "FILE", "A .glb to upload, or a .pscene for the renderer's own tools.", CLI_OFFER_FILES,
+        .offset = offsetof(struct options, output)},
+    {"triangles", "N", "About so many (hairball, foliage, columns).", .take = take_triangles},
+    {"seed", "N", "Another scene of the same kind.", .take = take_seed},
+    {"caster-height", "M", "Metres above the receiver.", .take = take_caster_height},
+    {"caster-half-size", "M", "Half the side of the square caster, in metres.",
+        .take = take_caster_half_size},
+    {"second-height", "M", "The lower caster's, in metres (stacked, duplicate).",
+        .take = take_second_height},
+    {0},
+};
 
 static int write_file(const char *path, const void *data, size_t bytes)
 {
-    char *part = cli_format("%s.part", path);
-    FILE *file = fopen(part, "wb");
-    bool ok = file && fwrite(data, 1, bytes, file) == bytes;
-    if (file && fclose(file))
-        ok = false;
-    ok = ok && !rename(part, path);
-    if (!ok)
-        unlink(part);
-    free(part);
-    return ok ? CLI_OK : cli_fail(CLI_FAILED, "%s cannot be written.", path);
+    struct cli_output output;
+    int status = cli_output_open(&output, path);
+    if (status == CLI_OK)
+        fwrite(data, 1, bytes, output.file);
+    return cli_output_end(&output, status);
 }
 
-int cli_generate(struct cli_args *args)
+static int run(const struct cli_command *command, struct cli_args *args)
 {
-    struct pen_generated_options options = {0};
-    const char *kind_name = NULL, *output = NULL, *word;
-    int kind = -1;
-    double value;
-    while (args->at < args->count && args->status == CLI_OK) {
-        if (cli_option(args, "o", &output))
-            continue;
-        if (number_option(args, "triangles", 1, 3e6, true, &value))
-            options.triangles = (uint32_t)value;
-        else if (number_option(args, "seed", 0, 4294967295.0, true, &value))
-            options.seed = (uint32_t)value;
-        else if (number_option(args, "caster-height", 1e-3, 1e3, false, &value))
-            options.caster_height = (float)value;
-        else if (number_option(args, "caster-half-size", 1e-3, 1e3, false, &value))
-            options.caster_half_size = (float)value;
-        else if (number_option(args, "second-height", 1e-3, 1e3, false, &value))
-            options.second_height = (float)value;
-        else if (cli_flag(args, "help") || cli_flag(args, "h")) {
-            help();
-            return CLI_OK;
-        } else if (!kind_name && (word = cli_positional(args)))
-            kind_name = word;
-        else
-            return cli_unknown(args, "generate");
-    }
-    if (args->status != CLI_OK)
-        return args->status;
-    for (int i = 0; kind_name && i < PEN_GENERATED_KINDS; i++)
-        if (!strcmp(kind_name, pen_generated_names[i]))
-            kind = i;
+    struct options options = {0};
+    int status = cli_parse(command, args, &options, NULL);
+    if (status != CLI_OK || options.common.help)
+        return status;
+    const char *name = options.common.words[0], *output = options.output;
+    int kind = name ? pen_choice_index(pen_generated_names, name) : -1;
     if (kind < 0)
         return cli_fail(CLI_USAGE, "Which kind of scene? See penumbra generate --help.");
     if (!output || !*output)
         return cli_fail(CLI_USAGE, "Where to? Give -o FILE.");
-    options.kind = (uint32_t)kind;
+    options.scene.kind = (uint32_t)kind;
     struct pen_error error = {0};
     void *data = NULL;
     size_t bytes = 0;
     const char *dot = strrchr(output, '.');
     bool blob = dot && !strcmp(dot, ".pscene");
-    bool ok = blob ? pen_generate_blob(&options, &data, &bytes, &error)
-                   : pen_generate_glb(&options, &data, &bytes, &error);
-    int status = ok ? write_file(output, data, bytes) : cli_fail(CLI_FAILED, "%s", error.message);
+    bool ok = blob ? pen_generate_blob(&options.scene, &data, &bytes, &error)
+                   : pen_generate_glb(&options.scene, &data, &bytes, &error);
+    status = ok ? write_file(output, data, bytes) : cli_fail(CLI_FAILED, "%s", error.message);
     free(data);
     return status;
 }
+
+const struct cli_command cli_generate = {.name = "generate",
+    .summary = "makes a demo or test scene",
+    .words = "KIND -o FILE",
+    .about = "Makes a scene by penumbra's own code: the demo, and those that the tests know the "
+             "answer of.",
+    .rows = generate_rows,
+    .choices = pen_generated_names,
+    .local = true,
+    .most_words = 1,
+    .run = run};

@@ -1,7 +1,9 @@
 #include "clients/cli/gltf_files.h"
+#include "clients/cli/output.h"
 #include "protocol/memory.h"
 #include "protocol/request.h"
 #include "renderer/import/names.h"
+#include <errno.h>
 #include <dirent.h>
 #include <openssl/evp.h>
 #include <stdlib.h>
@@ -118,6 +120,8 @@ static char *read_text(const char *path, size_t *bytes)
         (text = malloc((size_t)info.st_size + 1))) {
         *bytes = fread(text, 1, (size_t)info.st_size, file);
         text[*bytes] = 0;
+    } else if (file) {
+        errno = S_ISDIR(info.st_mode) ? EISDIR : EINVAL;
     }
     if (file)
         fclose(file);
@@ -136,7 +140,7 @@ int cli_gltf_files(const char *path, struct cli_files *files)
     const char *slash = strrchr(path, '/');
     *files = (struct cli_files){0};
     if (!text)
-        return cli_fail(CLI_FAILED, "%s cannot be read.", path);
+        return cli_output_fail(path, "read");
     cJSON *root = cJSON_ParseWithLength(text, bytes);
     free(text);
     if (!cJSON_IsObject(root)) {

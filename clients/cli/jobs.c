@@ -1,21 +1,16 @@
 #include "clients/cli/jobs.h"
 #include "clients/cli/listing.h"
+#include "clients/cli/rows/command.h"
+#include "clients/cli/rows/parse.h"
+#include "clients/cli/which.h"
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 #include <unistd.h>
 
+#define BAR 30 /* characters */
 #define FIRST_PAUSE_US 50000
 #define MOST_PAUSE_US 1000000
-
-static const char help_text[] =
-    "penumbra jobs [list [--json]]   lists the jobs, from the newest on\n"
-    "penumbra jobs show ID           how far a job is, as JSON\n"
-    "penumbra jobs wait ID           waits until it is over, and shows it\n"
-    "penumbra jobs cancel ID         ends a job, or removes one that is over with its files\n"
-    "\n"
-    "  --server URL   default: $PENUMBRA_SERVER or http://127.0.0.1:8080\n"
-    "  --retry N      how often a busy server is asked again (4)\n"
-    "  -v             prints calls and times\n";
 
 static void print_job(const cJSON *job)
 {
@@ -25,12 +20,23 @@ static void print_job(const cJSON *job)
         cli_number(frames, "total"), cli_number(job, "bytes") / 1e6);
 }
 
-static void tell(const cJSON *job)
+/* "running [#####.....]  12 of 36 frames, 0:07 left", on a terminal. */
+static void tell(const cJSON *job, double elapsed_s)
 {
+    char bar[BAR + 1];
     const cJSON *frames = cJSON_GetObjectItemCaseSensitive(job, "frames");
-    if (isatty(STDERR_FILENO))
-        fprintf(stderr, "\r%s: %.0f of %.0f frames ", cli_text(job, "state"),
-            cli_number(frames, "done"), cli_number(frames, "total"));
+    double done = cli_number(frames, "done"), total = cli_number(frames, "total");
+    double share = total > 0 ? done / total : 0;
+    if (!isatty(STDERR_FILENO))
+        return;
+    for (int i = 0; i < BAR; i++)
+        bar[i] = i < (int)(share * BAR + 0.5) ? '#' : '.';
+    bar[BAR] = 0;
+    fprintf(stderr, "\r%s [%s] %.0f of %.0f frames", cli_text(job, "state"), bar, done, total);
+    int left_s = done > 0 ? (int)(elapsed_s * (total - done) / done + 0.5) : 0;
+    if (done > 0 && done < total)
+        fprintf(stderr, ", %d:%02d left", left_s / 60, left_s % 60);
+    fputs("\033[K", stderr);
 }
 
 static int get(const struct cli_server *server, const char *path, cJSON **job)
@@ -46,12 +52,16 @@ static int get(const struct cli_server *server, const char *path, cJSON **job)
 int cli_wait_job(const struct cli_server *server, const char *path, cJSON **job)
 {
     unsigned pause_us = FIRST_PAUSE_US;
+    struct timespec start, now;
+    clock_gettime(CLOCK_MONOTONIC, &start);
     const char *state;
     for (;;) {
         int status = get(server, path, job);
         if (status != CLI_OK)
             return status;
-        tell(*job);
+        clock_gettime(CLOCK_MONOTONIC, &now);
+        tell(*job,
+            (double)(now.tv_sec - start.tv_sec) + 1e-9 * (double)(now.tv_nsec - start.tv_nsec));
         state = cli_text(*job, "state");
         if (strcmp(state, "accepted") && strcmp(state, "running"))
             break;
@@ -81,20 +91,47 @@ static int wait_for(const struct cli_server *server, const char *id)
     return status;
 }
 
-int cli_jobs(struct cli_args *args)
+struct options {
+    struct cli_common common;
+    bool json;
+};
+
+static int run(const struct cli_command *command, struct cli_args *args)
 {
-    struct cli_server server;
-    const char *words[2] = {"list", NULL};
-    bool json = false;
-    if (!cli_words(args, &(struct cli_words){"jobs", help_text, words, 2, &server, &json}))
-        return args->status;
-    if (!strcmp(words[0], "list") && !words[1])
-        return cli_list(&server, "/v1/jobs", "jobs", json, print_job);
-    if (!strcmp(words[0], "show") && words[1])
-        return cli_with_id(&server, "GET", "/v1/jobs", words[1]);
-    if (!strcmp(words[0], "cancel") && words[1])
-        return cli_with_id(&server, "DELETE", "/v1/jobs", words[1]);
-    if (!strcmp(words[0], "wait") && words[1])
-        return wait_for(&server, words[1]);
-    return cli_fail(CLI_USAGE, "See penumbra jobs --help.");
+    struct options options = {0};
+    int status = cli_parse(command, args, &options, NULL);
+    if (status != CLI_OK || options.common.help)
+        return status;
+    const struct cli_server *server = &options.common.server;
+    const char *word = options.common.count ? options.common.words[0] : "list";
+    const char *id = options.common.words[1];
+    if (!strcmp(word, "list") && !id)
+        return cli_list(server, "/v1/jobs", "jobs", options.json, print_job);
+    bool show = !strcmp(word, "show"), cancel = !strcmp(word, "cancel"),
+         wait = !strcmp(word, "wait");
+    if (!id || !(show || cancel || wait))
+        return cli_fail(CLI_USAGE, "See penumbra jobs --help.");
+    if (!cli_is_prefix(id))
+        return cli_fail(CLI_USAGE, "%s is no id of a job, nor at least %d of its first digits.", id,
+            PEN_ID_PREFIX);
+    return wait ? wait_for(server, id)
+                : cli_with_id(server, show ? "GET" : "DELETE", "/v1/jobs", id);
 }
+
+const struct cli_command cli_jobs = {.name = "jobs",
+    .summary = "lists, shows, waits for and cancels jobs of the server",
+    .words = "",
+    .actions = (const struct cli_action[]){{"list", "", "Lists the jobs, from the newest on."},
+        {"show", "ID", "How far a job is, as JSON.", CLI_OFFER_JOBS},
+        {"wait", "ID", "Waits until it is over, and shows it.", CLI_OFFER_JOBS},
+        {"cancel", "ID", "Ends a job, or removes one that is over with its files.", CLI_OFFER_JOBS},
+        {0}},
+    .about =
+        "Jobs of the server: sequences, and what was asked for with Prefer: respond-async. ID is "
+        "a job's id, or as many of its first digits as no other job has. Without a word it "
+        "lists.",
+    .rows =
+        (const struct cli_row[]){
+            {"json", NULL, "Lists as JSON.", .offset = offsetof(struct options, json)}, {0}},
+    .most_words = 2,
+    .run = run};

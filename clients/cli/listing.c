@@ -1,5 +1,4 @@
 #include "clients/cli/listing.h"
-#include "clients/cli/upload.h"
 #include <stdlib.h>
 #include <string.h>
 
@@ -66,8 +65,6 @@ int cli_with_id(
     const struct cli_server *server, const char *method, const char *folder, const char *id)
 {
     struct cli_answer answer;
-    if (!cli_is_id(id))
-        return cli_fail(CLI_USAGE, "An id has 64 hexadecimal digits.");
     char *path = cli_format("%s/%s", folder, id);
     struct cli_call call = {.method = method, .path = path};
     int status = cli_call(server, &call, &answer);

@@ -1,61 +1,64 @@
 /* penumbra: the command-line client of the render daemon. */
-#include "clients/cli/cli.h"
+#include "clients/cli/output.h"
+#include "clients/cli/rows/command.h"
+#include "clients/cli/rows/help.h"
+#include "clients/cli/rows/parse.h"
 #include <curl/curl.h>
 #include <signal.h>
 #include <string.h>
 
-static const char help_text[] =
-    "penumbra render SCENE -o FILE    renders a scene with soft shadows\n"
-    "penumbra compare SCENE           measures shadow methods against a reference\n"
-    "penumbra sequence SCENE -o OUT   renders many views of a scene: a turntable, keyframes ...\n"
-    "penumbra jobs                    lists, shows, waits for and cancels jobs of the server\n"
-    "penumbra scenes                  lists, shows, uploads and deletes scenes\n"
-    "penumbra techniques [NAME]       lists the shadow methods, or explains one\n"
-    "penumbra generate KIND -o FILE   makes a demo or test scene\n"
-    "penumbra version\n"
-    "\n"
-    "penumbra COMMAND --help says more. The server is --server URL, $PENUMBRA_SERVER or\n"
-    "http://127.0.0.1:8080; $PENUMBRA_TOKEN is sent as a bearer token.\n"
-    "\n"
-    "Exit status: 0 done, 1 a file cannot be read or written, 2 wrong usage, 3 the server refuses\n"
-    "(4xx), 4 the server failed or is busy (5xx), 5 no connection.\n";
-
-static int version(struct cli_args *args)
+static int print_version(const struct cli_command *command, struct cli_args *args)
 {
-    if (args->at < args->count)
-        return cli_unknown(args, "version");
-    puts("penumbra " PENUMBRA_VERSION);
-    return CLI_OK;
+    struct cli_common options = {0};
+    int status = cli_parse(command, args, &options, NULL);
+    if (status == CLI_OK && !options.help)
+        puts("penumbra " PENUMBRA_VERSION);
+    return status;
+}
+
+const struct cli_command cli_version = {.name = "version",
+    .summary = "prints the version",
+    .words = "",
+    .rows = (const struct cli_row[]){{0}},
+    .local = true,
+    .run = print_version};
+
+static const struct cli_command *find(const char *name)
+{
+    if (!strcmp(name, "--version"))
+        return &cli_version;
+    if (!strcmp(name, cli_manual.name))
+        return &cli_manual;
+    for (const struct cli_command *const *c = cli_commands; *c; c++)
+        if (!strcmp(name, (*c)->name))
+            return *c;
+    return NULL;
 }
 
 int main(int argc, char **argv)
 {
-    static const struct {
-        const char *name;
-        int (*run)(struct cli_args *);
-    } commands[] = {{"render", cli_render}, {"compare", cli_compare}, {"sequence", cli_sequence},
-        {"jobs", cli_jobs}, {"scenes", cli_scenes}, {"techniques", cli_techniques},
-        {"generate", cli_generate}, {"version", version}, {"--version", version}};
     const char *name = argc > 1 ? argv[1] : "";
     struct cli_args args = {argv, argc, 2, CLI_OK};
-    if (!strcmp(name, "help") || !strcmp(name, "--help") || !strcmp(name, "-h")) {
-        fputs(help_text, stdout);
-        return CLI_OK;
+    bool help = !strcmp(name, "help") || !strcmp(name, "--help") || !strcmp(name, "-h");
+    const struct cli_command *command = find(help && argc > 2 ? argv[2] : name);
+    if (help && command)
+        cli_print_help(command);
+    else if (help)
+        cli_print_overview(stdout);
+    if (help)
+        return fflush(stdout) ? CLI_FAILED : CLI_OK;
+    if (!command) {
+        if (*name)
+            cli_fail(CLI_USAGE, "There is no command %s.", name);
+        cli_print_overview(stderr);
+        return CLI_USAGE;
     }
     signal(SIGPIPE, SIG_IGN); /* a reader that leaves shows as a failed write */
+    cli_output_guard();
     curl_global_init(CURL_GLOBAL_DEFAULT);
-    for (size_t i = 0; i < sizeof commands / sizeof *commands; i++) {
-        if (strcmp(name, commands[i].name))
-            continue;
-        int status = commands[i].run(&args);
-        curl_global_cleanup();
-        if (fflush(stdout) && status == CLI_OK)
-            status = cli_fail(CLI_FAILED, "Standard output cannot be written.");
-        return status;
-    }
+    int status = command->run(command, &args);
     curl_global_cleanup();
-    if (*name)
-        cli_fail(CLI_USAGE, "There is no command %s.", name);
-    fputs(help_text, stderr);
-    return CLI_USAGE;
+    if (fflush(stdout) && status == CLI_OK)
+        status = cli_fail(CLI_FAILED, "Standard output cannot be written.");
+    return status;
 }

@@ -1,8 +1,8 @@
 #include "clients/cli/parts.h"
+#include "clients/cli/output.h"
 #include "protocol/memory.h"
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 #define MAX_MARK 128 /* a line break, two dashes and the boundary */
 
@@ -28,19 +28,11 @@ static void drop(struct parts *p, size_t bytes)
 
 static bool write_file(const char *path, const char *bytes, size_t count)
 {
-    bool to_stdout = !strcmp(path, "-");
-    char *part = cli_format("%s.part", path);
-    FILE *file = to_stdout ? stdout : fopen(part, "wb");
-    bool ok = file && fwrite(bytes, 1, count, file) == count;
-    if (file)
-        ok = !(to_stdout ? fflush(file) : fclose(file)) && ok;
-    if (!to_stdout) {
-        ok = ok && !rename(part, path);
-        if (!ok)
-            unlink(part);
-    }
-    free(part);
-    return ok || cli_fail(CLI_FAILED, "%s cannot be written.", path) == CLI_OK;
+    struct cli_output output;
+    int status = cli_output_open(&output, path);
+    if (status == CLI_OK)
+        fwrite(bytes, 1, count, output.file);
+    return cli_output_end(&output, status) == CLI_OK;
 }
 
 /* A part is whole. */

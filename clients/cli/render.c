@@ -1,6 +1,9 @@
 #include "clients/cli/render.h"
+#include "clients/cli/output.h"
 #include "clients/cli/parts.h"
 #include "clients/cli/request_args.h"
+#include "clients/cli/rows/command.h"
+#include "clients/cli/rows/parse.h"
 #include "clients/cli/upload.h"
 #include "protocol/request.h"
 #include <stdlib.h>
@@ -8,57 +11,23 @@
 #include <strings.h>
 #include <unistd.h>
 
-static void help(void)
-{
-    puts("penumbra render SCENE -o FILE [options]\n"
-         "\n"
-         "SCENE is a .glb, a .gltf with the files that it names, a .zip of these, or the id of a\n"
-         "stored scene. It is uploaded only when the server does not have it. Where a zip holds\n"
-         "several scenes, FILE.zip#ENTRY takes one.\n"
-         "\n"
-         "  -o FILE                            where the image goes; its ending names the format; "
-         "-:\n"
-         "                                     standard output\n"
-         "  --technique NAME                   the shadow method; see penumbra techniques\n"
-         "  --set NAME=VALUE                   a parameter of the method; may be repeated\n"
-         "  --light NAME=VALUE,NAME=VALUE...   adds a light; none: ambient light only\n"
-         "  --json FILE                        the request as JSON (-: standard input); flags "
-         "after\n"
-         "                                     it change it\n"
-         "  --json-record                      prints how the image was made, as JSON\n"
-         "  --server URL                       default: $PENUMBRA_SERVER or http://127.0.0.1:8080\n"
-         "  --retry N                          how often a busy server is asked again (4)\n"
-         "  -v                                 prints calls and times\n");
-    cli_render_help();
-}
-
 struct options {
-    struct cli_server server;
-    const char *scene, *output;
-    bool record, help;
+    struct cli_common common;
+    const char *output;
+    bool record;
 };
 
-static int parse(struct cli_args *args, struct options *options, cJSON *root)
+static const struct cli_row render_rows[] = {
+    {"o", "FILE", "Where the image goes; its ending names the format. -: standard output.",
+        CLI_OFFER_FILES, .offset = offsetof(struct options, output)},
+    {"json-record", NULL, "Prints how the image was made, as JSON.",
+        .offset = offsetof(struct options, record)},
+    {0},
+};
+
+static int check(const struct options *options)
 {
-    cli_server_init(&options->server);
-    while (args->at < args->count && args->status == CLI_OK) {
-        const char *positional;
-        if (cli_common_option(args, &options->server) || cli_option(args, "o", &options->output))
-            continue;
-        if (cli_flag(args, "json-record"))
-            options->record = true;
-        else if (cli_flag(args, "help") || cli_flag(args, "h"))
-            options->help = true;
-        else if (cli_request_option(args, root))
-            continue;
-        else if (!options->scene && (positional = cli_positional(args)))
-            options->scene = positional;
-        else
-            return cli_unknown(args, "render");
-    }
-    if (args->status != CLI_OK || options->help)
-        return args->status;
-    if (!options->scene)
+    if (!options->common.count)
         return cli_fail(CLI_USAGE, "Which scene? See penumbra render --help.");
     if (!options->output && !options->record)
         return cli_fail(CLI_USAGE, "Where to? Give -o FILE, or --json-record.");
@@ -71,14 +40,14 @@ static int parse(struct cli_args *args, struct options *options, cJSON *root)
 }
 
 /* The format that the output's ending stands for, unless the request names one. */
-static int choose_format(const struct options *options, cJSON *root)
+int cli_choose_format(const char *path, cJSON *root)
 {
     static const struct {
         const char *ending;
         enum pen_format format;
     } others[] = {{"jpg", PEN_JPEG}, {"tif", PEN_TIFF}};
-    const char *name = options->output ? strrchr(options->output, '/') : NULL;
-    const char *dot = options->output ? strrchr(name ? name : options->output, '.') : NULL;
+    const char *name = path ? strrchr(path, '/') : NULL;
+    const char *dot = path ? strrchr(name ? name : path, '.') : NULL;
     int format = -1;
     if (cli_request_has(root, "output", "format") || !dot || !dot[1])
         return CLI_OK;
@@ -143,27 +112,19 @@ int cli_save(const struct cli_server *server, struct cli_call *call, const char 
     const char *kind, const char *word)
 {
     struct cli_answer answer = {0};
-    bool to_stdout = !strcmp(path, "-");
-    char *part = cli_format("%s.part", path);
-    FILE *sink = to_stdout ? stdout : fopen(part, "wb");
-    int status = sink ? CLI_OK : cli_fail(CLI_FAILED, "%s cannot be written.", part);
+    struct cli_output output;
+    int status = cli_output_open(&output, path);
     if (status == CLI_OK) {
-        call->sink = sink;
+        call->sink = output.file;
         status = cli_call(server, call, &answer);
     }
     if (status == CLI_OK && strncmp(answer.type, kind, strlen(kind)))
         status = cli_fail(CLI_SERVER, "The server's answer is %s, not %s.",
             answer.type[0] ? answer.type : "of no type", word);
-    if (sink && (to_stdout ? fflush(sink) : fclose(sink)) && status == CLI_OK)
-        status = cli_fail(CLI_FAILED, "%s cannot be written.", path);
-    if (status == CLI_OK && !to_stdout && rename(part, path))
-        status = cli_fail(CLI_FAILED, "%s cannot be written.", path);
-    if (status != CLI_OK && sink && !to_stdout)
-        unlink(part);
+    status = cli_output_end(&output, status);
     if (status == CLI_OK)
         tell(server, &answer, path);
     cli_answer_finish(&answer);
-    free(part);
     return status;
 }
 
@@ -204,13 +165,11 @@ static int save_parts(const struct cli_server *server, struct cli_call *call, co
     return status;
 }
 
-static int render(const struct options *options, cJSON *root)
+int cli_render_scene(
+    const struct cli_server *server, const char *id, cJSON *root, bool record, const char *output)
 {
-    const struct cli_server *server = &options->server;
-    char id[PEN_ID_HEX + 1], *image = NULL;
-    int status = cli_upload_scene(server, options->scene, id, NULL);
-    if (status == CLI_OK)
-        status = cli_upload_textures(server, root);
+    char *image = NULL;
+    int status = cli_upload_textures(server, root);
     if (status != CLI_OK)
         return status;
     char *body = cJSON_PrintUnformatted(root), *path = cli_format("/v1/scenes/%s/render", id);
@@ -219,9 +178,9 @@ static int render(const struct options *options, cJSON *root)
         .content_type = "application/json",
         .body = body,
         .doing = "rendering"};
-    if (options->record)
+    if (record)
         status = print_record(server, &call, &image);
-    if (status == CLI_OK && options->output) {
+    if (status == CLI_OK && output) {
         call.accept = accepted(root);
         if (image) { /* the one that the record describes */
             call.method = "GET";
@@ -230,8 +189,8 @@ static int render(const struct options *options, cJSON *root)
         }
         bool gets_better =
             !image && cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(root, "progressive"));
-        status = gets_better ? save_parts(server, &call, options->output)
-                             : cli_save_image(server, &call, options->output);
+        status =
+            gets_better ? save_parts(server, &call, output) : cli_save_image(server, &call, output);
     }
     free(image);
     free(path);
@@ -239,19 +198,32 @@ static int render(const struct options *options, cJSON *root)
     return status;
 }
 
-int cli_render(struct cli_args *args)
+static int run(const struct cli_command *command, struct cli_args *args)
 {
     struct options options = {0};
+    char id[PEN_ID_HEX + 1];
     cJSON *root = cJSON_CreateObject();
-    int status = parse(args, &options, root);
-    if (status == CLI_OK && options.help)
-        help();
-    else {
+    int status = cli_parse(command, args, &options, root);
+    if (status == CLI_OK && !options.common.help) {
+        status = check(&options);
         if (status == CLI_OK)
-            status = choose_format(&options, root);
+            status = cli_choose_format(options.output, root);
         if (status == CLI_OK)
-            status = render(&options, root);
+            status = cli_upload_scene(&options.common.server, options.common.words[0], id, NULL);
+        if (status == CLI_OK)
+            status =
+                cli_render_scene(&options.common.server, id, root, options.record, options.output);
     }
     cJSON_Delete(root);
     return status;
 }
+
+const struct cli_command cli_render = {.name = "render",
+    .summary = "renders a scene with soft shadows",
+    .words = "SCENE -o FILE",
+    .about = CLI_ABOUT_SCENE " It is uploaded only when the server does not have it.",
+    .rows = render_rows,
+    .offer = CLI_OFFER_SCENES,
+    .requests = CLI_RENDER_REQUEST,
+    .most_words = 1,
+    .run = run};

@@ -242,9 +242,51 @@ bool cli_request_has(const cJSON *root, const char *group, const char *key)
     return cJSON_GetObjectItemCaseSensitive(object, key) != NULL;
 }
 
-static void print_row(const struct row_set *set, const struct pen_param *row)
+/* ---- how they are shown ---- */
+
+static const char *flag_word(double value)
 {
-    char name[64], usage[160], range[160] = "";
+    return value != 0 ? "on" : "off";
+}
+
+/* "0.01 to 1000 frames/s; default: 24", "" when there is nothing to say. */
+static char *describe(const struct pen_param *row)
+{
+    char *range = cli_format("%s", ""), *standard, *all;
+    if (row->choices)
+        for (int i = 0; row->choices[i]; i++) {
+            char *longer = cli_format("%s%s%s", range, i ? ", " : "one of ", row->choices[i]);
+            free(range);
+            range = longer;
+        }
+    else if (row->type != PEN_PARAM_FLAG && row->type != PEN_PARAM_TEXT) {
+        free(range);
+        range = cli_format(
+            "%g to %g%s%s", row->min, row->max, row->unit ? " " : "", row->unit ? row->unit : "");
+    }
+    if (row->automatic)
+        standard = cli_format("default: what suits");
+    else if (row->type == PEN_PARAM_TEXT)
+        standard = cli_format("%s", "");
+    else if (row->choices)
+        standard = cli_format("default: %s", row->choices[(int)row->def]);
+    else if (row->type == PEN_PARAM_FLAG)
+        standard = cli_format("default: %s", flag_word(row->def));
+    else if (row->count == 3)
+        standard = cli_format("default: %g,%g,%g", row->def_v[0], row->def_v[1], row->def_v[2]);
+    else
+        standard = cli_format("default: %g", row->def);
+    all = cli_format("%s%s%s%s%s%s", row->help, *range || *standard ? " (" : "", range,
+        *range && *standard ? "; " : "", standard, *range || *standard ? ")" : "");
+    free(range);
+    free(standard);
+    return all;
+}
+
+static void show_row(
+    const struct row_set *set, const struct pen_param *row, cli_show *show, void *context)
+{
+    char name[64], usage[160], *help = describe(row);
     flag_name(set, row, name);
     if (row->type == PEN_PARAM_FLAG)
         snprintf(usage, sizeof usage, row->word ? "--%s[=%s], --no-%s" : "--%s, %s--no-%s", name,
@@ -255,37 +297,89 @@ static void print_row(const struct row_set *set, const struct pen_param *row)
             : row->count == 3                           ? "X,Y,Z"
                                                         : "N",
             row->word ? "|" : "", row->word ? row->word : "");
-    if (row->choices)
-        for (int i = 0; row->choices[i]; i++)
-            snprintf(range + strlen(range), sizeof range - strlen(range), "%s%s",
-                i ? " " : "one of: ", row->choices[i]);
-    else if (row->type != PEN_PARAM_FLAG && row->type != PEN_PARAM_TEXT)
-        snprintf(range, sizeof range, "%g to %g%s%s", row->min, row->max, row->unit ? " " : "",
-            row->unit ? row->unit : "");
-    printf("  %-34s %s%s%s%s\n", usage, row->help, *range ? " (" : "", range, *range ? ")" : "");
+    bool flag = row->type == PEN_PARAM_FLAG;
+    show(context, &(struct cli_shown){.name = name,
+                      .usage = usage,
+                      .help = help,
+                      .flag = flag,
+                      .negatable = flag,
+                      .choices = row->choices,
+                      .word = flag ? NULL : row->word});
+    free(help);
 }
 
-static void print_rows(size_t first, size_t end)
+static void show_rows(size_t first, size_t end, cli_show *show, void *context)
 {
     for (size_t s = first; s < end; s++) {
         struct pen_param_table table = row_sets[s].table();
         for (uint32_t r = 0; r < table.count; r++)
             if (is_in(&row_sets[s], &table.rows[r]))
-                print_row(&row_sets[s], &table.rows[r]);
+                show_row(&row_sets[s], &table.rows[r], show, context);
     }
 }
 
-void cli_sequence_help(void)
+void cli_each_request_row(bool sequence, cli_show *show, void *context)
 {
-    print_rows(REQUEST_SETS, ROW_SETS);
-    cli_render_help();
+    static const struct cli_shown own[] = {
+        {.name = "technique",
+            .usage = "--technique NAME",
+            .help = "The shadow method; see penumbra techniques.",
+            .offer = CLI_OFFER_TECHNIQUES},
+        {.name = "set",
+            .usage = "--set NAME=VALUE",
+            .help = "A parameter of the method; may be repeated."},
+        {.name = "light",
+            .usage = "--light NAME=VALUE,NAME=VALUE...",
+            .help = "Adds a light, with the keys below; none: ambient light only."},
+        {.name = "json",
+            .usage = "--json FILE",
+            .help = "The request as JSON (-: standard input); flags after it change it.",
+            .offer = CLI_OFFER_FILES},
+    };
+    for (size_t i = 0; i < sizeof own / sizeof *own; i++)
+        show(context, &own[i]);
+    if (sequence)
+        show_rows(REQUEST_SETS, ROW_SETS, show, context);
+    show_rows(0, REQUEST_SETS, show, context);
 }
 
-void cli_render_help(void)
+/* A list of names, "rect, disk". */
+static char *join(const char *const *names, uint32_t mask)
 {
-    print_rows(0, REQUEST_SETS);
-    puts("\nKeys of --light, besides type and texture (a pattern, an id or a file):");
+    char *list = cli_format("%s", "");
+    for (int i = 0; names[i]; i++) {
+        if (mask && !(mask & 1u << i))
+            continue;
+        char *longer = cli_format("%s%s%s", list, *list ? ", " : "", names[i]);
+        free(list);
+        list = longer;
+    }
+    return list;
+}
+
+void cli_each_light_key(cli_show *show, void *context)
+{
+    char *types = join(pen_light_type_names, 0), *patterns = join(pen_pattern_names, 0);
+    char *type = cli_format("One of %s; default: %s.", types, pen_light_type_names[0]);
+    char *texture =
+        cli_format("What a rect emits: an image file, the id of a stored one, or one of "
+                   "the patterns %s. Black texels cut any shape.",
+            patterns);
+    show(context, &(struct cli_shown){.name = "type", .usage = "type", .help = type});
+    show(context, &(struct cli_shown){.name = "texture", .usage = "texture", .help = texture});
     struct pen_param_table table = pen_light_table();
-    for (uint32_t r = 0; r < table.count; r++)
-        printf("  %-34s %s\n", table.rows[r].name, table.rows[r].help);
+    for (uint32_t r = 0; r < table.count; r++) {
+        const struct pen_param *row = &table.rows[r];
+        char *of = row->applies ? join(pen_light_type_names, row->applies) : NULL;
+        char *help = describe(row);
+        char *all = cli_format("%s%s%s", of ? of : "", of ? ": " : "", help);
+        show(context, &(struct cli_shown){.name = row->name, .usage = row->name, .help = all});
+        free(of);
+        free(help);
+        free(all);
+    }
+    free(types);
+    free(patterns);
+    free(type);
+    free(texture);
 }

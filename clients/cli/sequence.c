@@ -1,67 +1,29 @@
 #include "clients/cli/jobs.h"
 #include "clients/cli/listing.h"
+#include "clients/cli/output.h"
 #include "clients/cli/render.h"
 #include "clients/cli/request_args.h"
+#include "clients/cli/rows/command.h"
+#include "clients/cli/rows/parse.h"
 #include "clients/cli/upload.h"
 #include "protocol/request.h"
-#include <errno.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
-#include <sys/stat.h>
-
-static void help(void)
-{
-    puts(
-        "penumbra sequence SCENE -o OUT [options]\n"
-        "\n"
-        "Renders many views of a scene as a job of the server, waits for it, and fetches what it\n"
-        "gives. OUT is FILE.zip, FILE.webp (an animated picture), or a folder for the frames. "
-        "Ctrl-C\n"
-        "leaves the job to itself: penumbra jobs lists and cancels it. Without one of\n"
-        "--turntable-*, views and keyframes (both in --json, under \"sequence\") the camera "
-        "stands\n"
-        "still; --animation poses the scene, 1/fps s further in each frame.\n"
-        "\n"
-        "  -o OUT                             where the frames go\n"
-        "  --detach                           prints the job's id instead of waiting for it\n"
-        "  --json FILE, --technique NAME, --set NAME=VALUE, --light ..., --server URL, --retry N,\n"
-        "  -v                                 as for penumbra render\n");
-    cli_sequence_help();
-}
 
 struct options {
-    struct cli_server server;
-    const char *scene, *output;
-    bool detach, help;
+    struct cli_common common;
+    const char *output;
+    bool detach;
 };
 
-static int parse(struct cli_args *args, struct options *options, cJSON *root)
-{
-    cli_server_init(&options->server);
-    while (args->at < args->count && args->status == CLI_OK) {
-        const char *positional;
-        if (cli_common_option(args, &options->server) || cli_option(args, "o", &options->output))
-            continue;
-        if (cli_flag(args, "detach"))
-            options->detach = true;
-        else if (cli_flag(args, "help") || cli_flag(args, "h"))
-            options->help = true;
-        else if (cli_sequence_option(args, root))
-            continue;
-        else if (!options->scene && (positional = cli_positional(args)))
-            options->scene = positional;
-        else
-            return cli_unknown(args, "sequence");
-    }
-    if (args->status != CLI_OK || options->help)
-        return args->status;
-    if (!options->scene)
-        return cli_fail(CLI_USAGE, "Which scene? See penumbra sequence --help.");
-    if (!options->output && !options->detach)
-        return cli_fail(CLI_USAGE, "Where to? Give -o OUT, or --detach.");
-    return CLI_OK;
-}
+static const struct cli_row sequence_rows[] = {
+    {"o", "OUT", "Where the frames go: FILE.zip, FILE.webp (an animated picture), or a folder.",
+        CLI_OFFER_FILES, .offset = offsetof(struct options, output)},
+    {"detach", NULL, "Prints the job's id instead of waiting for it.",
+        .offset = offsetof(struct options, detach)},
+    {0},
+};
 
 static bool ends_with(const char *text, const char *ending)
 {
@@ -114,14 +76,12 @@ static const char *format_of(const cJSON *root)
 static int fetch_frames(
     const struct options *options, const char *path, const cJSON *root, uint32_t count)
 {
-    int status = CLI_OK;
-    if (mkdir(options->output, 0777) && errno != EEXIST)
-        return cli_fail(CLI_FAILED, "%s cannot be made: %s.", options->output, strerror(errno));
+    int status = cli_output_folder(options->output);
     for (uint32_t i = 0; i < count && status == CLI_OK; i++) {
         char *from = cli_format("%s/frames/%u", path, i);
         char *to = cli_format("%s/%06u.%s", options->output, i, format_of(root));
         struct cli_call call = {.method = "GET", .path = from, .accept = "image/*"};
-        status = cli_save_image(&options->server, &call, to);
+        status = cli_save_image(&options->common.server, &call, to);
         free(from);
         free(to);
     }
@@ -136,19 +96,19 @@ static int fetch(const struct options *options, const char *path, const cJSON *r
         return fetch_frames(options, path, root, (uint32_t)cli_number(frames, "total"));
     char *result = cli_format("%s/result", path);
     struct cli_call call = {.method = "GET", .path = result, .accept = "*/*"};
-    int status = cli_save(&options->server, &call, options->output,
+    int status = cli_save(&options->common.server, &call, options->output,
         webp ? "image/webp" : "application/zip", webp ? "an animated picture" : "a zip");
     free(result);
     return status;
 }
 
-static int run(const struct options *options, cJSON *root)
+static int render(const struct options *options, cJSON *root)
 {
-    const struct cli_server *server = &options->server;
+    const struct cli_server *server = &options->common.server;
     char id[PEN_ID_HEX + 1], *path = NULL;
     cJSON *job = NULL;
     choose_archive(options, root);
-    int status = cli_upload_scene(server, options->scene, id, NULL);
+    int status = cli_upload_scene(server, options->common.words[0], id, NULL);
     if (status == CLI_OK)
         status = cli_upload_textures(server, root);
     if (status == CLI_OK) {
@@ -164,15 +124,34 @@ static int run(const struct options *options, cJSON *root)
     return status;
 }
 
-int cli_sequence(struct cli_args *args)
+static int run(const struct cli_command *command, struct cli_args *args)
 {
     struct options options = {0};
     cJSON *root = cJSON_CreateObject();
-    int status = parse(args, &options, root);
-    if (status == CLI_OK && options.help)
-        help();
-    else if (status == CLI_OK)
-        status = run(&options, root);
+    int status = cli_parse(command, args, &options, root);
+    if (status == CLI_OK && !options.common.help) {
+        if (!options.common.count)
+            status = cli_fail(CLI_USAGE, "Which scene? See penumbra sequence --help.");
+        else if (!options.output && !options.detach)
+            status = cli_fail(CLI_USAGE, "Where to? Give -o OUT, or --detach.");
+        else
+            status = render(&options, root);
+    }
     cJSON_Delete(root);
     return status;
 }
+
+const struct cli_command cli_sequence = {.name = "sequence",
+    .summary = "renders many views of a scene: turntables, keyframes, animations",
+    .words = "SCENE -o OUT",
+    .about =
+        "Renders many views of a scene as a job of the server, waits for it, and fetches what it "
+        "gives. Ctrl-C leaves the job to itself: penumbra jobs lists and cancels it. Without one "
+        "of "
+        "--turntable-*, views and keyframes (both in --json, under \"sequence\") the camera stands "
+        "still; --animation poses the scene, 1/fps s further in each frame.\n" CLI_ABOUT_SCENE,
+    .rows = sequence_rows,
+    .offer = CLI_OFFER_SCENES,
+    .requests = CLI_SEQUENCE_REQUEST,
+    .most_words = 1,
+    .run = run};

@@ -1,13 +1,8 @@
 #include "clients/cli/http.h"
+#include "clients/cli/rows/command.h"
+#include "clients/cli/rows/parse.h"
 #include <stdlib.h>
 #include <string.h>
-
-static const char help_text[] =
-    "penumbra techniques [NAME] [--json]   lists the shadow methods, or explains one\n"
-    "\n"
-    "  --server URL   default: $PENUMBRA_SERVER or http://127.0.0.1:8080\n"
-    "  --retry N      how often a busy server is asked again (4)\n"
-    "  -v             prints calls and times\n";
 
 static const char *text(const cJSON *object, const char *key)
 {
@@ -58,23 +53,28 @@ static void print_list(const cJSON *root)
             text(technique, "title"));
 }
 
-int cli_techniques(struct cli_args *args)
+struct options {
+    struct cli_common common;
+    bool json;
+};
+
+static int run(const struct cli_command *command, struct cli_args *args)
 {
-    struct cli_server server;
-    const char *name = NULL;
-    bool json = false;
-    if (!cli_words(args, &(struct cli_words){"techniques", help_text, &name, 1, &server, &json}))
-        return args->status;
+    struct options options = {0};
+    int status = cli_parse(command, args, &options, NULL);
+    if (status != CLI_OK || options.common.help)
+        return status;
+    const char *name = options.common.words[0];
     if (name && name[strspn(name, "abcdefghijklmnopqrstuvwxyz0123456789-")])
         return cli_fail(CLI_USAGE, "A method's name has lower-case letters, digits and '-'.");
     struct cli_answer answer;
     char *path = cli_format("/v1/techniques%s%s", name ? "/" : "", name ? name : "");
     struct cli_call call = {.method = "GET", .path = path};
-    int status = cli_call(&server, &call, &answer);
+    status = cli_call(&options.common.server, &call, &answer);
     cJSON *root = status == CLI_OK ? cli_answer_object(&answer) : NULL;
     if (status == CLI_OK && !root)
         status = CLI_SERVER;
-    if (root && json)
+    if (root && options.json)
         puts(answer.text);
     else if (root && name)
         print_technique(root);
@@ -85,3 +85,16 @@ int cli_techniques(struct cli_args *args)
     free(path);
     return status;
 }
+
+const struct cli_command cli_techniques = {.name = "techniques",
+    .summary = "lists the shadow methods, or explains one",
+    .words = "[NAME]",
+    .about = "Lists the shadow methods: name, cost class and title; of one, its parameters with "
+             "default, "
+             "range and help, its citation and what it does wrong.",
+    .rows = (const struct cli_row[]){{"json", NULL, "Prints the server's answer.",
+                                         .offset = offsetof(struct options, json)},
+        {0}},
+    .offer = CLI_OFFER_TECHNIQUES,
+    .most_words = 1,
+    .run = run};

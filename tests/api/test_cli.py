@@ -30,7 +30,11 @@ class Stub(http.server.ThreadingHTTPServer):
         super().__init__(("127.0.0.1", 0), Handler)
         self.calls = []
         self.stored = {"/v1/scenes": {}, "/v1/images": {}}
+        self.names = {}
         self.script = []
+
+    def handle_error(self, *_):
+        """Clients that leave are no news."""
 
     @property
     def url(self):
@@ -72,9 +76,16 @@ class Handler(http.server.BaseHTTPRequestHandler):
         body = self.body()
         self.server.calls.append((self.command, self.path, dict(self.headers), body))
         if self.server.script:
-            self.answer(*self.server.script.pop(0))
+            answer = self.server.script.pop(0)
+            if callable(answer):
+                answer(self)
+            else:
+                self.answer(*answer)
             return
         folder, _, rest = self.path[1:].partition("/")[2].partition("/")
+        if "?" in folder:
+            folder, _, rest = self.path[4:].partition("?")
+            rest = "?" + rest
         folder = "/v1/" + folder
         stored = self.server.stored.get(folder)
         if self.path.endswith("/render"):
@@ -93,15 +104,23 @@ class Handler(http.server.BaseHTTPRequestHandler):
             self.answer(201, {"id": identity, "warnings": ["a warning"]})
         elif self.command == "PUT":
             rest, _, query = rest.partition("?")
-            entry = urllib.parse.unquote(query.removeprefix("entry=")).encode()
+            said = dict(urllib.parse.parse_qsl(query))
+            entry = said.get("entry", "").encode()
+            self.server.names[rest] = said.get("name", "")
             head = b"PENENTR1" + struct.pack("<II", len(entry), 0) + entry if entry else b""
             if hashlib.sha256(head + body).hexdigest() != rest:
                 self.problem(422, "Unprocessable Content", "The bytes hash to something else.")
                 return
             stored[rest] = body
             self.answer(201, {"id": rest, "warnings": []})
-        elif not rest:
-            self.answer(200, {"scenes": [{"id": i, "triangles": 7} for i in stored]})
+        elif not rest or rest.startswith("?"):
+            wanted = dict(urllib.parse.parse_qsl(rest[1:])).get("name", "")
+            self.answer(200, {"scenes": [
+                {"id": i, "triangles": 7, "name": self.server.names.get(i, ""), "tags": ["a", "b"]}
+                for i in stored if wanted.lower() in self.server.names.get(i, "").lower()]})
+        elif self.path.startswith("/v1/scenes/") and len(rest) < 64 and (
+                len(found := [i for i in stored if i.startswith(rest)]) == 1):
+            self.answer(200, {"id": found[0], "warnings": []})
         elif rest not in stored:
             self.problem(404, "Not Found", "There is no scene %s." % rest[:8])
         elif self.command == "DELETE":
@@ -111,10 +130,17 @@ class Handler(http.server.BaseHTTPRequestHandler):
         else:
             self.answer(200, {"id": rest, "warnings": []})
 
+    def do_PATCH(self):
+        body = self.body()
+        self.server.calls.append((self.command, self.path, dict(self.headers), body))
+        self.answer(200, {"id": self.path[11:], "triangles": 7, "tags": [], **json.loads(body)})
+
     do_GET = do_POST = do_PUT = do_DELETE = handle_call
 
 
-class Cli(unittest.TestCase):
+class Command(unittest.TestCase):
+    """A stub, a folder with a scene in it, and the program."""
+
     def setUp(self):
         self.stub = Stub()
         threading.Thread(target=self.stub.serve_forever, args=[0.02], daemon=True).start()
@@ -151,11 +177,15 @@ class Cli(unittest.TestCase):
     def files(self):
         return sorted(p.name for p in self.folder.iterdir())
 
+
+class Cli(Command):
     def test_render_uploads_once(self):
         self.run_cli("render", "scene.glb", "-o", "out.png", "--technique", "pcss", "--set",
                      "search_taps=32")
         scene, render = "/v1/scenes/" + self.id, "/v1/scenes/%s/render" % self.id
-        self.assertEqual(self.seen(), [("GET", scene), ("PUT", scene), ("POST", render)])
+        self.assertEqual(self.seen(), [
+            ("GET", scene), ("PUT", scene + "?name=" + "".join("%%%02x" % b for b in b"scene.glb")),
+            ("POST", render)])
         self.assertEqual(self.stub.stored["/v1/scenes"][self.id], self.scene.read_bytes())
         self.assertEqual(self.stub.calls[1][2]["Content-Type"], "model/gltf-binary")
         self.assertEqual(self.stub.calls[2][2]["Accept"], "image/png")
@@ -453,8 +483,9 @@ class Cli(unittest.TestCase):
                      "render a -o a.png --camera-eye 1,2", "render a -o a.png --nonsense 1",
                      "render a -o a.png --set x", "render a -o a.png --set =1",
                      "render a -o a.png --light x", "render a -o a.png --light width=0",
-                     "render a -o a.png --retry -1", "scenes show", "scenes show abc",
-                     "scenes delete ../x", "scenes nonsense", "scenes list x", "techniques a b",
+                     "render a -o a.png --retry -1", "scenes show", "jobs show abc", "jobs wait ../x",
+                     "scenes nonsense", "scenes change", "watch", "watch x.glb", "watch x.glb -o -",
+                     "completion", "completion csh", "scenes list x", "techniques a b",
                      "techniques ../x", "version x", "generate", "generate nonsense -o x.glb",
                      "generate demo", "generate hairball -o x.glb --triangles -1",
                      "generate hairball -o x.glb --triangles 1e9"):
@@ -474,6 +505,12 @@ class Cli(unittest.TestCase):
         self.run_cli("generate", "half-plane", "-o", "no/h.glb", status=1)
 
 
-if __name__ == "__main__":
+def main():
+    """Usage: ... PATH-OF-PENUMBRA"""
+    global PROGRAM
     PROGRAM = os.path.abspath(sys.argv.pop(1))
     unittest.main()
+
+
+if __name__ == "__main__":
+    main()

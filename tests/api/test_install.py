@@ -64,23 +64,28 @@ class Install(unittest.TestCase):
                          "penumbrad %s\n" % VERSION)
 
     def test_manual(self):
-        """Each page names its program, the version and everything that --help prints."""
-        for name, section, commands in (
-                ("penumbrad", 8, [()]),
-                ("penumbra", 1, [(), ("render",), ("compare",), ("scenes",), ("generate",)])):
+        """Each page names its program and the version; it has what the program says of itself."""
+        for name, section, says in (("penumbrad", 8, "--help"), ("penumbra", 1, "manual")):
             with open(self.path("share", "man", "man%d" % section, "%s.%d" % (name, section)),
                       encoding="utf-8") as file:
                 page = file.read()
             self.assertRegex(page, r'^\.TH %s %d "" "penumbra %s"\n' % (
                 name, section, re.escape(VERSION)))
+            said = output(self.path("bin", name), says)
             plain = page.replace("\n\\&", "\n").replace("\\-", "-").replace("\\e", "\\")
-            for command in commands:
-                self.assertIn(output(self.path("bin", name), *command, "--help"), plain)
+            self.assertIn(said, page if says == "manual" else plain)
             if shutil.which("man"):
                 shown = subprocess.run(["man", "--warnings", "-l", "-P", "cat", self.path(
                     "share", "man", "man%d" % section, "%s.%d" % (name, section))],
                     capture_output=True, text=True)
                 self.assertEqual((shown.returncode, shown.stderr), (0, ""))
+
+    def test_completion(self):
+        for shell, path in (("bash", "bash-completion/completions/penumbra"),
+                            ("zsh", "zsh/site-functions/_penumbra"),
+                            ("fish", "fish/vendor_completions.d/penumbra.fish")):
+            with open(self.path("share", *path.split("/")), encoding="utf-8") as file:
+                self.assertEqual(file.read(), output(self.path("bin", "penumbra"), "completion", shell))
 
     def test_papers_and_unit(self):
         self.assertTrue(os.path.isfile(self.path("share", "doc", "penumbra", "README.md")))

@@ -4,6 +4,10 @@ if(PENUMBRA_DAEMON)
     if(Python3_FOUND)
         add_test(NAME api.cli COMMAND ${Python3_EXECUTABLE}
             ${CMAKE_SOURCE_DIR}/tests/api/test_cli.py $<TARGET_FILE:penumbra>)
-        set_tests_properties(api.cli PROPERTIES LABELS "api;smoke" TIMEOUT 600 RESOURCE_LOCK waiting)
+        add_test(NAME api.cli_files COMMAND ${Python3_EXECUTABLE}
+            ${CMAKE_SOURCE_DIR}/tests/api/test_cli_files.py $<TARGET_FILE:penumbra>)
+        add_test(NAME api.cli_shell COMMAND ${Python3_EXECUTABLE}
+            ${CMAKE_SOURCE_DIR}/tests/api/test_cli_shell.py $<TARGET_FILE:penumbra>)
+        set_tests_properties(api.cli api.cli_files api.cli_shell PROPERTIES LABELS "api;smoke" TIMEOUT 600 RESOURCE_LOCK waiting)
     endif()
 endif()

@@ -62,8 +62,8 @@ bool sky_occlusion(const struct frame_job *job, const struct gbuffer *gbuffer,
     struct pass_texture textures[] = {{UNIT_DEPTH, gbuffer->depth.texture.name, GL_SAMPLE_NEAREST},
         {UNIT_NORMAL, gbuffer->normal.texture.name, GL_SAMPLE_NEAREST},
         {UNIT_SOLID, solid ? solid->name : 0, GL_SAMPLE_NEAREST}};
-    gl_target_fit(&t->sky_open[0], GL_R8, width, height, 0, 1);
-    gl_target_fit(&t->sky_open[1], GL_R8, width, height, 0, 1);
+    gl_target_fit(&t->sky_open[0], GL_RG32F, width, height, 0, 1);
+    gl_target_fit(&t->sky_open[1], GL_RG32F, width, height, 0, 1);
     struct pass_fill pass = {.name = "sky occlusion",
         .fragment = "occlusion.frag",
         .defines = solid ? "#define LAYER\n" : NULL,
@@ -77,12 +77,12 @@ bool sky_occlusion(const struct frame_job *job, const struct gbuffer *gbuffer,
         .extra_bytes = sizeof reach};
     if (!pass_fill(job->ctx, &pass, error))
         return false;
-    textures[2] =
-        (struct pass_texture){UNIT_SOURCE, t->sky_open[0].texture.name, GL_SAMPLE_NEAREST};
+    struct pass_texture noisy = {UNIT_SOURCE, t->sky_open[0].texture.name, GL_SAMPLE_NEAREST};
     pass.name = "sky occlusion blur";
     pass.fragment = "occlusion_blur.frag";
     pass.defines = NULL;
-    pass.texture_count = 3;
+    pass.textures = &noisy;
+    pass.texture_count = 1;
     pass.framebuffer = t->sky_open[1].framebuffer;
     pass.extra = NULL;
     if (!pass_fill(job->ctx, &pass, error))
@@ -117,6 +117,18 @@ static void make_shade_block(
     }
 }
 
+static bool fill(const struct frame_job *job, struct pass_fill *pass, const char *name,
+    enum pass_where where, const char *defines, uint32_t lights, struct pen_error *error)
+{
+    char all[400];
+    snprintf(all, sizeof all, "#define LIGHTS %u\n%s%s", lights, defines,
+        where == PASS_BACKGROUND ? "#define BACKGROUND\n" : "");
+    pass->name = name;
+    pass->where = where;
+    pass->defines = all;
+    return pass_fill(job->ctx, pass, error);
+}
+
 bool frame_shade(const struct frame_job *job, const struct shading *f, struct pen_error *error)
 {
     const struct frame_targets *t = job->targets;
@@ -144,28 +156,27 @@ bool frame_shade(const struct frame_job *job, const struct shading *f, struct pe
         punctual |= type >= PEN_LIGHT_SUN;
     }
     char defines[320];
-    snprintf(defines, sizeof defines, "#define LIGHTS %u\n%s%s%s%s%s%s%s%s%s%s%s", f->light_count,
-        layered ? "#define LAYERED\n" : "", f->layer ? "#define LAYER\n" : "",
+    snprintf(defines, sizeof defines, "%s%s%s%s%s%s%s%s%s%s%s", layered ? "#define LAYERED\n" : "",
+        f->layer ? "#define LAYER\n" : "",
         pen_request_is_transparent(job->request) ? "#define TRANSPARENT\n" : "",
         job->request->ground.on == PEN_FLAG_WORD && !f->layer ? "#define CATCHER\n" : "",
         job->request->sky.on ? "#define SKY\n" : "",
         job->scene->has_gloss ? "#define GLOSSY\n" : "", direct ? "#define RESOLVE\n" : "",
         emission ? "#define EMIT\n" : "", rect ? "#define HAS_RECT\n" : "",
         round ? "#define HAS_ROUND\n" : "", punctual ? "#define HAS_PUNCTUAL\n" : "");
-    return pass_fill(job->ctx,
-        &(struct pass_fill){.name = "shade",
-            .fragment = "shade.frag",
-            .defines = defines,
-            .stage = PEN_STAGE_SHADE,
-            .textures = textures,
-            .texture_count = emission ? 7 : 6,
-            .framebuffer = target->framebuffer,
-            .width = job->request->width,
-            .height = job->request->height,
-            .tiles = f->tiles,
-            .add = !direct && !layered,
-            .under = layered,
-            .extra = &block,
-            .extra_bytes = sizeof block},
-        error);
+    struct pass_fill pass = {.fragment = "shade.frag",
+        .stage = PEN_STAGE_SHADE,
+        .textures = textures,
+        .texture_count = emission ? 7 : 6,
+        .framebuffer = target->framebuffer,
+        .width = job->request->width,
+        .height = job->request->height,
+        .tiles = f->tiles,
+        .depth = g->depth.texture.name,
+        .add = !direct && !layered,
+        .under = layered,
+        .extra = &block,
+        .extra_bytes = sizeof block};
+    return fill(job, &pass, "shade", PASS_SURFACES, defines, f->light_count, error) &&
+           fill(job, &pass, "background", PASS_BACKGROUND, defines, 0, error);
 }

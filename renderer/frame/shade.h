@@ -2,8 +2,8 @@
 #pragma once
 #include "renderer/frame/job.h"
 
-/* Draws how much of the sky each pixel's surface sees into targets->sky_open[1], R8, half the
- * picture's size. `solid`: depth of what stands around the surfaces of the G-buffer besides them, or
+/* Draws how much of the sky each pixel's surface sees into targets->sky_open[1], half the picture's
+ * size. `solid`: depth of what stands around the surfaces of the G-buffer besides them, or
  * NULL. */
 bool sky_occlusion(const struct frame_job *job, const struct gbuffer *gbuffer,
     const struct gl_texture *solid, struct pen_error *error);

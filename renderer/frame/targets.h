@@ -27,8 +27,9 @@ struct frame_targets {
     /* Of a picture that is seen before it is complete: R32F, mean visibilities; RG32F, how far they
      * are apart, by tiles. */
     struct gl_target means[FRAME_MEANS], spread;
-    struct frame_edges *edges;    /* edges.h; of the frame in progress, or NULL */
-    struct gl_target sky_open[2]; /* R8, half size: how much of the sky is seen; raw, smooth */
+    struct frame_edges *edges; /* edges.h; of the frame in progress, or NULL */
+    struct gl_target
+        sky_open[2]; /* RG32F, half size: how much of the sky is seen, depth; raw, smooth */
     const struct gbuffer *sky_of; /* whose sky that is, or NULL, */
     uint32_t sky_drawn;           /* as it was drawn for the so many-th time */
 };

@@ -41,6 +41,8 @@ struct drawing {
     bool add, under, least, mute;
     const struct gl_texture *tiles; /* NULL: all pixels */
     int32_t tile_class, tile_px;
+    enum pass_where where;
+    GLuint depth;
     struct pass_texture own[4]; /* what a method's pass always reads */
     uint32_t own_count;
     const struct pass_texture *textures;
@@ -80,6 +82,17 @@ static void draw_tiles(const struct drawing *d, const struct pass_pieces *piece)
     gl.Disable(GL_PROGRAM_POINT_SIZE);
 }
 
+static void test_depth(const struct drawing *d)
+{
+    if (d->where == PASS_EVERYWHERE)
+        return;
+    /* What is drawn lies at 0, the background's depth. Nothing is written, so that the texture may
+     * be read in the same draw (OpenGL 4.5, 9.3.1). */
+    gl.Enable(GL_DEPTH_TEST);
+    gl.DepthFunc(d->where == PASS_SURFACES ? GL_LESS : GL_EQUAL);
+    gl.DepthMask(GL_FALSE);
+}
+
 static void draw_piece(const struct drawing *d, const struct pass_pieces *piece)
 {
     gl.BindFramebuffer(GL_FRAMEBUFFER, d->framebuffer);
@@ -101,6 +114,7 @@ static void draw_piece(const struct drawing *d, const struct pass_pieces *piece)
     }
     if (d->mute)
         gl.ColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_FALSE);
+    test_depth(d);
     if (d->tiles) {
         draw_tiles(d, piece);
     } else {
@@ -110,6 +124,8 @@ static void draw_piece(const struct drawing *d, const struct pass_pieces *piece)
     gl.Disable(GL_BLEND);
     gl.BlendEquation(GL_FUNC_ADD);
     gl.ColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
+    gl.Disable(GL_DEPTH_TEST);
+    gl.DepthMask(GL_TRUE);
 }
 
 static bool draw(const struct drawing *d, struct pen_error *error)
@@ -120,6 +136,8 @@ static bool draw(const struct drawing *d, struct pen_error *error)
     if (d->tiles)
         gl.ProgramUniform2i(d->program, LOCATION_TILE, d->tile_px, d->tile_class);
     bind(d);
+    if (d->depth)
+        gl.NamedFramebufferTexture(d->framebuffer, GL_DEPTH_ATTACHMENT, d->depth, 0);
     pass_pieces_begin(d->ctx, &pieces, d->width, d->height, d->kind);
     while (ok && more) {
         if (turn != d->ctx->turns.number)
@@ -128,6 +146,8 @@ static bool draw(const struct drawing *d, struct pen_error *error)
         draw_piece(d, &pieces);
         ok = pass_pieces_next(d->ctx, &pieces, &more, error);
     }
+    if (d->depth)
+        gl.NamedFramebufferTexture(d->framebuffer, GL_DEPTH_ATTACHMENT, 0, 0);
     unbind(d);
     return ok;
 }
@@ -168,9 +188,10 @@ bool pass_screen(struct technique_run *run, const struct pass_screen *pass, stru
     struct technique_ctx *ctx = run->ctx;
     char defines[1024];
     bool fade = !pass->framebuffer && !run->technique->counts_horizon;
-    snprintf(defines, sizeof defines, "#define LIGHT_SHAPE %d\n#define LIGHT_PARALLEL %d\n%s%s",
-        run->face->shape, run->face->parallel, fade ? "#define HORIZON_FADE\n" : "",
-        pass->defines ? pass->defines : "");
+    snprintf(defines, sizeof defines, "#define LIGHT_SHAPE %d\n#define LIGHT_PARALLEL %d\n%s%s%s",
+        run->face->shape, run->face->parallel,
+        run->face->cube || run->face->omni ? "#define LIGHT_HAS_MORE\n" : "",
+        fade ? "#define HORIZON_FADE\n" : "", pass->defines ? pass->defines : "");
     struct gl_program_desc desc = {.vertex = pass->tiles ? "tiles.vert" : "screen.vert",
         .fragment = "screen.frag",
         .body = pass->body,
@@ -187,6 +208,8 @@ bool pass_screen(struct technique_run *run, const struct pass_screen *pass, stru
         .tiles = pass->tiles,
         .tile_class = TILE_UNDECIDED,
         .tile_px = pass->tile_px ? (int32_t)pass->tile_px : CLASSIFY_TILE,
+        .where = PASS_SURFACES,
+        .depth = run->gbuffer->depth.texture.name,
         .textures = pass->textures,
         .texture_count = pass->texture_count};
     if (!d.program)
@@ -226,6 +249,8 @@ bool pass_fill(struct technique_ctx *ctx, const struct pass_fill *pass, struct p
         .tiles = pass->tiles,
         .tile_class = TILE_UNDECIDED,
         .tile_px = pass->tile_px ? (int32_t)pass->tile_px : CLASSIFY_TILE,
+        .where = pass->where,
+        .depth = pass->depth,
         .textures = pass->textures,
         .texture_count = pass->texture_count};
     if (!d.program)

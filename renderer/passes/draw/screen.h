@@ -32,6 +32,10 @@ bool pass_screen(
 
 /* As pass_screen, but over all pixels and without a Surface: the file `fragment` is a whole
  * fragment shader. Stage and framebuffer are the caller's choice. */
+/* Pixels by the G-buffer's depth, which is 0 where there is nothing. The test comes before the
+ * fragment, so that the others cost next to nothing. */
+enum pass_where { PASS_EVERYWHERE, PASS_SURFACES, PASS_BACKGROUND };
+
 struct pass_fill {
     const char *name, *fragment, *defines;
     enum pen_stage stage;
@@ -44,6 +48,8 @@ struct pass_fill {
     bool mute;  /* no colour is written: the pass counts */
     const struct gl_texture *tiles; /* as above */
     uint32_t tile_px;
+    enum pass_where where;
+    GLuint depth; /* of the G-buffer, unless everywhere; may be looked up in, too */
     const void *extra;
     uint32_t extra_bytes;
     const struct pen_technique_info *info; /* parameters for P(name), or NULL */

@@ -55,8 +55,9 @@ float irradiance_rect(vec3 p, vec3 n, vec3 center, vec3 half_x, vec3 half_y)
     for (int i = 0; i < 4; i++)
         sum[i] = moments[i] * roots[i] * angle_over_sine_acute(min(products[i] * roots[i], 1.0));
     float e = 0.5 * abs(sum.x + sum.y + sum.z + sum.w);
-    float lowest = dot(to, n) - abs(dot(half_x, n)) - abs(dot(half_y, n));
-    int edges = lowest < 0.0 || any(lessThan(products, vec4(0.0))) ? 5 : 0;
+    float height = dot(to, n), reach = abs(dot(half_x, n)) + abs(dot(half_y, n));
+    bool above = height > -reach;
+    int edges = above && (height < reach || any(lessThan(products, vec4(0.0)))) ? 5 : 0;
     vec3 leave = vec3(0.0), enter = vec3(0.0);
     float clipped = 0.0;
     vec2 from = vec2(-1.0);
@@ -68,7 +69,7 @@ float irradiance_rect(vec3 p, vec3 n, vec3 center, vec3 half_x, vec3 half_y)
         clipped += clipped_edge(a, b, above_a, above_b, n, leave, enter);
         from = next;
     }
-    return edges > 0 ? 0.5 * abs(clipped) : e;
+    return !above ? 0.0 : edges > 0 ? 0.5 * abs(clipped) : e;
 }
 
 // A disk as the regular polygon of the same area.

@@ -1,8 +1,9 @@
 // How much of the sky a surface sees past what is near it on the screen: horizons along slices
 // through the depth buffer, the arc between them integrated in closed form (Jimenez et al. 2016,
 // practical real-time strategies for accurate indirect occlusion). Half the picture's resolution;
-// the slices turn in a 4 x 4 pattern that occlusion_blur.frag averages away. LAYER: what is solid
-// stands around a blended layer too.
+// the slices turn in a 4 x 4 pattern that occlusion_blur.frag averages away. The depth goes along,
+// so that who looks for texels of the same surface looks up once. LAYER: what is solid stands
+// around a blended layer too.
 #include "view.glsl"
 #include "octahedral.glsl"
 #include "occlusion.def"
@@ -13,7 +14,7 @@ layout(binding = UNIT_NORMAL) uniform sampler2D g_normal;
 layout(binding = UNIT_SOLID) uniform sampler2D depth_solid;
 #endif
 
-layout(location = 0) out float open;
+layout(location = 0) out vec2 open; // share of the sky, depth
 
 const int SLICES = 2, STEPS = 4;
 
@@ -35,7 +36,7 @@ void main()
     ivec2 at = ivec2(gl_FragCoord.xy), size = ivec2(view.viewport.xy);
     ivec2 pixel = min(2 * at + 1, size - 1);
     float depth = texelFetch(g_depth, pixel, 0).r;
-    open = 1.0;
+    open = vec2(1.0, depth);
     if (depth == 0.0)
         return;
     vec3 forward = view.forward.xyz;
@@ -82,5 +83,5 @@ void main()
         sum +=
             share * (arc(horizon.x, turned, cos_n, sin_n) + arc(horizon.y, turned, cos_n, sin_n));
     }
-    open = clamp(sum / float(SLICES), 0.0, 1.0);
+    open.x = clamp(sum / float(SLICES), 0.0, 1.0);
 }

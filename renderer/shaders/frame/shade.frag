@@ -1,10 +1,11 @@
 // Direct light of all lights times their visibility, plus ambient and emission. RESOLVE: there is
-// one frame only, so the display curve is applied here. TRANSPARENT: alpha is how much of the pixel
-// the scene covers; what is summed over frames is multiplied by it. CATCHER: of the ground only the
-// shadow is there, as black that covers the more the less light arrives. LAYERED: the picture is
-// summed up of layers, and this is what is solid or, LAYER, a blended one, times its alpha. LIGHTS
-// is a constant: unrolled, each light's uniforms are read once for all pixels instead of gathered
-// per pixel.
+// one frame only, so the display curve is applied here. TRANSPARENT: alpha is how much of the
+// pixel the scene covers; what is summed over frames is multiplied by it. CATCHER: of the ground
+// only the shadow is there, as black that covers the more the less light arrives. LAYERED: the
+// picture is summed up of layers, and this is what is solid or, LAYER, a blended one, times its
+// alpha. BACKGROUND: of the pixels where there is nothing; otherwise there is something. LIGHTS is
+// a constant: unrolled, each light's uniforms are read once for all pixels instead of gathered per
+// pixel.
 #include "view.glsl"
 #include "octahedral.glsl"
 #include "irradiance.glsl"
@@ -22,7 +23,7 @@ layout(binding = UNIT_EMITTED) uniform sampler2D g_emission;
 layout(binding = UNIT_SOURCE) uniform sampler2DArray visibility_maps;
 
 #ifdef SKY
-layout(binding = UNIT_SKY_OPEN) uniform sampler2D sky_open; // half size
+layout(binding = UNIT_SKY_OPEN) uniform sampler2D sky_open; // of occlusion_blur.frag
 #endif
 
 layout(location = 0) out vec4 color;
@@ -153,14 +154,12 @@ vec3 reflected(Reflectance m, ShadeLight s, vec3 p, vec3 n, vec3 v)
 // How much of the sky the pixel sees: of the four half-size texels around it, those at its depth.
 float open_to_sky(ivec2 pixel, float depth)
 {
-    ivec2 last = textureSize(sky_open, 0) - 1, base = (pixel - 1) >> 1,
-          size = ivec2(view.viewport.xy);
+    ivec2 last = textureSize(sky_open, 0) - 1, base = (pixel - 1) >> 1;
     float sum = 0.0, weight = 0.0;
     for (int i = 0; i < 4; i++) {
-        ivec2 q = clamp(base + ivec2(i & 1, i >> 1), ivec2(0), last);
-        float there = texelFetch(g_depth, min(2 * q + 1, size - 1), 0).r;
-        float w = exp2(-64.0 * abs(there - depth) / depth) + 1e-4;
-        sum += w * texelFetch(sky_open, q, 0).r;
+        vec2 there = texelFetch(sky_open, clamp(base + ivec2(i & 1, i >> 1), ivec2(0), last), 0).rg;
+        float w = exp2(-64.0 * abs(there.g - depth) / depth) + 1e-4;
+        sum += w * there.r;
         weight += w;
     }
     return sum / weight;
@@ -183,8 +182,13 @@ vec3 sky_reflected(Reflectance m, vec3 p, vec3 n, vec3 v, float open)
 void main()
 {
     ivec2 pixel = ivec2(gl_FragCoord.xy);
+#ifdef BACKGROUND
+    const bool hit = false;
+    const float depth = 0.0;
+#else
+    const bool hit = true;
     float depth = texelFetch(g_depth, pixel, 0).r;
-    bool hit = depth != 0.0;
+#endif
     vec3 p = unproject(view.clip_to_world, pixel_to_ndc(pixel), hit ? depth : 1.0);
     vec3 v = normalize(view.eye.xyz - p);
     vec3 n = octahedral_decode(texelFetch(g_normal, pixel, 0).zw);

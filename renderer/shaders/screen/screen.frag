@@ -1,4 +1,6 @@
-// A method's visibility() for every receiver of this face. The target starts at 1.
+// A method's visibility() for every receiver of this face; drawn where there is one. The target
+// starts at 1. LIGHT_HAS_MORE: not every receiver belongs to this face. Without, nothing is
+// discarded, which software rasterisers pay for in every pixel.
 #include "surface.glsl"
 #include "BODY"
 #ifdef HORIZON_FADE // the target is the method's visibility
@@ -11,9 +13,8 @@ void main()
 {
     ivec2 pixel = ivec2(gl_FragCoord.xy);
     float depth = texelFetch(g_depth, pixel, 0).r;
-    if (depth == 0.0)
-        discard;
     Surface s = surface_at(pixel, depth);
+#ifdef LIGHT_HAS_MORE
     float border = 1.0;
 #ifdef WITH_BORDER // also what the map of a cube's face shows beyond the face
     border = 1.02 + 1.02 * light.extent.x / light.near_z;
@@ -22,6 +23,7 @@ void main()
         discard;
     if (light.omni != 0 && s.p.z <= light.near_z)
         discard;
+#endif
     if (s.p.z <= 0.0 && !light_parallel)
         vis = vec4(0.0);
     else {

@@ -8,6 +8,7 @@ import { Penumbra, PenumbraError } from "./penumbra.js";
 const RADIANS = Math.PI / 180;
 const STEEPEST_DEG = 89;
 const REST_MS = 150; // after the last movement
+const QUICK_MS = 250; // between two changes that are a movement, as of a slider or a light
 const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
 
 /** A camera that looks at a point from a distance, +y up. */
@@ -171,6 +172,7 @@ export class PenumbraView extends Base {
   #pointers = new Map();
   #rest = 0;
   #due = false;
+  #changedAt = -QUICK_MS;
   #parts;
   #asked = ""; // the size of the last question
   #size = new ResizeObserver(() => this.#asked && this.#asked !== this.#shown && this.#ask());
@@ -270,7 +272,8 @@ export class PenumbraView extends Base {
     if (["server", "scene", "camera"].includes(name)) this.#orbit = this.#home = null;
     if (["server", "scene", "lights"].includes(name)) this.#held = null;
     this.#dress();
-    this.#ask();
+    if (["server", "scene"].includes(name)) this.#changedAt = -QUICK_MS;
+    this.#ask({ change: true });
   }
 
   #dress() {
@@ -280,16 +283,26 @@ export class PenumbraView extends Base {
     keys.textContent = this.orbit ? KEYS : "";
   }
 
-  /** Several changes at once are one question. */
-  #ask(brief = false) {
-    if (!brief) clearTimeout(this.#rest);
-    if (brief) return this.#latest.ask({ brief });
+  /** Several changes at once are one question, and in quick succession a movement. */
+  #ask({ change = false } = {}) {
+    clearTimeout(this.#rest);
     if (this.#due) return;
     this.#due = true;
     queueMicrotask(() => {
       this.#due = false;
-      if (this.isConnected && this.scene) this.#latest.ask({ brief: false });
+      if (!this.isConnected || !this.scene) return;
+      const now = performance.now(), quick = change && now - this.#changedAt < QUICK_MS;
+      if (change) this.#changedAt = now;
+      if (quick) this.#glide();
+      else this.#latest.ask({ brief: false });
     });
+  }
+
+  /** Small pictures now, the full one at rest. */
+  #glide() {
+    clearTimeout(this.#rest);
+    this.#latest.ask({ brief: true });
+    this.#rest = setTimeout(() => this.#ask(), REST_MS);
   }
 
   get #shown() {
@@ -407,10 +420,8 @@ export class PenumbraView extends Base {
   // ---- movements ----
 
   #moved() {
-    clearTimeout(this.#rest);
     this.#tell("camerachange", { camera: this.#orbit.camera, user: true });
-    this.#ask(true);
-    this.#rest = setTimeout(() => this.#ask(), REST_MS);
+    this.#glide();
   }
 
   get #moves() {

@@ -1,13 +1,12 @@
 // The viewer, and penumbra-view in a page of another origin, in Chromium.
 import assert from "node:assert/strict";
 import { createServer } from "node:http";
-import { createRequire } from "node:module";
 import { after, before, test } from "node:test";
 import { join } from "node:path";
+import { DAEMON, PICTURES, SCENE, close, count, failed, loaded, open, page, shown, until,
+  watched } from "./page.mjs";
 
-const { chromium } = createRequire(process.env.PACKAGES + "/")("playwright-core");
-const { DAEMON, SCENE, PICTURES } = process.env, PATIENCE_MS = Number(process.env.PATIENCE_MS);
-let browser, server, page, problems, under, most, asked;
+let server;
 
 const MARKUP = `<!doctype html><html lang="en"><title>other</title>
 <style>penumbra-view { width: 480px; height: 360px }</style>
@@ -15,8 +14,6 @@ const MARKUP = `<!doctype html><html lang="en"><title>other</title>
 <penumbra-view server="${DAEMON}" scene="${SCENE}" technique="hard" orbit></penumbra-view></html>`;
 
 before(async () => {
-  browser = await chromium.launch({ executablePath: process.env.CHROMIUM,
-    args: ["--no-sandbox", "--disable-gpu"] });
   server = createServer((request, response) => {
     response.setHeader("Content-Type", "text/html");
     response.setHeader("Content-Security-Policy",
@@ -27,58 +24,12 @@ before(async () => {
 });
 
 after(async () => {
-  await browser?.close();
+  await close();
   server.close();
 });
 
-/** Opens a page, counts its renders, and notes what goes wrong in it. */
-async function open(url, options = {}) {
-  await page?.context().close();
-  const context = await browser.newContext({ viewport: { width: 1280, height: 800 }, ...options });
-  page = await context.newPage();
-  page.setDefaultTimeout(PATIENCE_MS);
-  [problems, under, most, asked] = [[], new Set(), 0, []];
-  page.on("pageerror", reason => problems.push(String(reason)));
-  page.on("console", message => {
-    const said = message.text() + " " + message.location().url;
-    if (message.type() === "error" && !/ERR_INTERNET_DISCONNECTED|favicon/.test(said))
-      problems.push(said);
-  });
-  page.on("request", request => {
-    if (request.method() !== "POST" || !request.url().endsWith("/render")) return;
-    asked.push(request.postDataJSON());
-    under.add(request);
-    most = Math.max(most, under.size);
-  });
-  for (const kind of ["requestfinished", "requestfailed"])
-    page.on(kind, request => under.delete(request));
-  await page.addInitScript(() => {
-    globalThis.told = [];
-    for (const kind of ["load", "timing", "error", "camerachange"])
-      document.addEventListener(kind, ({ detail }) => detail && told.push({ kind, detail }), true);
-  });
-  await page.goto(url);
-}
 const other = options => open("http://127.0.0.1:" + server.address().port, options);
 
-/** Waits until something is true in the page, whose policy lets nobody wait there. */
-async function until(condition, given) {
-  for (const end = Date.now() + PATIENCE_MS; Date.now() < end;) {
-    const value = await page.evaluate(condition, given);
-    if (value) return value;
-    await page.waitForTimeout(20);
-  }
-  throw new Error("waited in vain");
-}
-
-/** The request of the next picture behind `from` events, once it is complete. */
-const loaded = (from = 0) => until(from => told.slice(from).find(t =>
-  t.kind === "load" && t.detail.done)?.detail.record.request, from);
-const failed = (from, again) => until(([from, again]) => told.slice(from)
-  .some(t => t.kind === "error" && t.detail.again === again), [from, again]);
-const count = () => page.evaluate(() => told.length);
-const shown = () => page.evaluate(() => document.querySelector("penumbra-view").shadowRoot
-  .querySelector("canvas").toDataURL());
 const set = given => page.evaluate(given =>
   void Object.assign(document.querySelector("penumbra-view"), given), given);
 
@@ -92,7 +43,7 @@ test("two lines show a picture in a page of another origin, whose policy is stri
     return new Set(new Uint32Array(data.buffer)).size;
   });
   assert.ok(colours > 100);
-  assert.deepEqual(problems, []);
+  assert.deepEqual(watched.problems, []);
 });
 
 test("dragging turns it in small pictures, then comes the full one, lit the same", async () => {
@@ -107,8 +58,8 @@ test("dragging turns it in small pictures, then comes the full one, lit the same
   const azimuth = ({ eye, target }) => Math.atan2(eye[0] - target[0], eye[2] - target[2]);
   const turned = ((azimuth(first.camera) - azimuth(last.camera)) * 180 / Math.PI + 360) % 360;
   assert.ok(Math.abs(turned - 180 * 100 / 360) < 0.1, turned + " degrees"); // 100 of 360 px
-  assert.ok(asked.some(request => request.width < 480));
-  assert.ok(most <= 2, most + " at once"); // one that is being aborted, and its successor
+  assert.ok(watched.asked.some(request => request.width < 480));
+  assert.ok(watched.most <= 2, watched.most + " at once"); // one that is being aborted, and its successor
   assert.notEqual(await shown(), before);
 });
 
@@ -139,8 +90,8 @@ test("100 fast changes leave no request behind and end with the right picture", 
   await page.waitForTimeout(500);
   const last = await page.evaluate(() => told.filter(t => t.kind === "load").at(-1).detail.record);
   assert.equal(last.request.technique.name, "pcss");
-  assert.equal(under.size, 0);
-  assert.ok(most <= 2, most + " at once");
+  assert.equal(watched.under.size, 0);
+  assert.ok(watched.most <= 2, watched.most + " at once");
 });
 
 test("a service that goes away is said, and shown again when it is back", async () => {
@@ -156,11 +107,11 @@ test("a service that goes away is said, and shown again when it is back", async 
 });
 
 test("what the daemon refuses is said once", async () => {
-  const from = await count(), before = asked.length;
+  const from = await count(), before = watched.asked.length;
   await set({ params: { nothing_like_it: 1 } });
   await failed(from, false);
   await page.waitForTimeout(1500);
-  assert.equal(asked.length, before + 1);
+  assert.equal(watched.asked.length, before + 1);
   assert.match(await page.locator("penumbra-view [part=status]").textContent(), /nothing_like_it/);
 });
 
@@ -180,5 +131,5 @@ for (const [name, options] of [["desktop", { colorScheme: "light" }],
     assert.match(page.url(), /technique=hard/);
     await page.goBack();
     await until(() => document.querySelector("#technique").value === "pcss");
-    assert.deepEqual(problems, []);
+    assert.deepEqual(watched.problems, []);
   });

@@ -1,7 +1,7 @@
-"""The dashboard and the element penumbra-view in Chromium, against a daemon.
+"""The viewer and the element penumbra-view in Chromium, against a daemon.
 
-usage: test_browser.py FOLDER, where the packages of package.json are kept; pictures of the pages go
-to its folder pictures. Exits 77 (skipped) without Chromium, node, or the packages."""
+usage: test_browser.py FOLDER TEST: the packages of package.json are kept in FOLDER, pictures of the
+pages go to its folder pictures; TEST is a file of this folder. Exits 77 (skipped) without Chromium, node, or the packages."""
 import os
 import shutil
 import subprocess
@@ -25,7 +25,7 @@ class Browser(unittest.TestCase):
         pictures = os.path.join(FOLDER, "pictures")
         os.makedirs(pictures, exist_ok=True)
         self.assertEqual(run_node(
-            "browser_test.mjs", 120 * PATIENCE, DAEMON="http://127.0.0.1:%d" % d.port, SCENE=name,
+            TEST, 120 * PATIENCE, DAEMON="http://127.0.0.1:%d" % d.port, SCENE=name,
             CHROMIUM=CHROMIUM, PATIENCE_MS=str(int(10000 * PATIENCE)), PACKAGES=FOLDER,
             PICTURES=pictures), 0)
         self.assertEqual(d.stop(), 0)
@@ -33,6 +33,7 @@ class Browser(unittest.TestCase):
 
 if __name__ == "__main__":
     FOLDER = os.path.abspath(sys.argv.pop(1))
+    TEST = sys.argv.pop(1)
     CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
     if not CHROMIUM or not has_node() or not shutil.which("npm"):
         print("skipped: no Chromium, or no node of version 18 or later with npm")

@@ -111,6 +111,16 @@ export function switchField({ value, take, ...rest }) {
   return element;
 }
 
+/** A colour, as "#rrggbb". */
+export function colorField({ value, take, ...rest }) {
+  const input = h("input", { type: "color" });
+  const element = row({ ...rest, control: input, take, read: () => input.value,
+    write: value => { input.value = value; } });
+  input.addEventListener("input", () => { element.mark(input.value); take(input.value); });
+  element.show(value);
+  return element;
+}
+
 /** A text of several numbers, separated by commas, or any text. */
 export function textField({ components = 1, value, take, ...rest }) {
   const input = h("input", { type: "text", spellcheck: false });

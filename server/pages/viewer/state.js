@@ -14,6 +14,7 @@ export const KEYS = {
   params: { ...json, start: {} }, // of the method, by name; those left out have their defaults
   camera: { ...json, start: null }, // {eye, target, fov_y_deg} or {index}; null: frames the scene
   lights: { ...json, start: null }, // as in a request; null: the scene's own, or the daemon's
+  held: { ...json, start: null }, // {exposure_ev, sky_level} that edited lights are seen with
   ground: { ...json, start: true }, // false, or "shadow"
   sky: { ...flag, start: true },
   sky_intensity: { ...number, start: 1 },
@@ -130,7 +131,7 @@ export class Store {
 }
 
 /** The keys that a picture depends on, besides its method, size and layer. */
-export const VIEW_KEYS = ["scene", "camera", "lights", "ground", "sky", "sky_intensity", "exposure",
+export const VIEW_KEYS = ["scene", "camera", "lights", "held", "ground", "sky", "sky_intensity", "exposure",
   "tone_map", "variant", "animation", "time_s"];
 
 /**
@@ -144,7 +145,9 @@ export function requestOf(state, chosenEv) {
   for (const key of ["ground", "sky", "sky_intensity", "tone_map", "variant", "animation",
     "antialias", "time_s"])
     if (!equal(state[key], KEYS[key].start)) request[key] = state[key];
-  if (state.exposure && chosenEv !== undefined) request.exposure_ev = chosenEv + state.exposure;
+  const ev = state.held?.exposure_ev ?? chosenEv;
+  if ((state.exposure || state.held) && ev !== undefined) request.exposure_ev = ev + state.exposure;
+  if (state.held) request.sky_level = state.held.sky_level;
   return request;
 }
 

@@ -14,7 +14,7 @@ export function mount(element, store, api) {
   element.append(view, notice, facts);
   let own = null; // the camera that the view reported last
 
-  store.on(["scene", "technique", "params", "lights", "ground", "sky", "sky_intensity", "exposure",
+  store.on(["scene", "technique", "params", "lights", "held", "ground", "sky", "sky_intensity", "exposure",
     "tone_map", "variant", "animation", "time_s", "layer", "width", "height", "antialias"], show);
   store.on(["camera"], ({ camera }) => {
     if (JSON.stringify(camera) === JSON.stringify(own)) return;

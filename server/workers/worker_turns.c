@@ -1,22 +1,17 @@
 #include "server/workers/worker_turns.h"
 #include "protocol/memory.h"
 #include "server/base/clock.h"
-#include "server/queue/accounts.h"
-#include <math.h>
+#include "server/queue/turn_order.h"
 #include <stdlib.h>
 
-/* A render that has only begun is not interrupted by its equals: if all are short, each is done
- * sooner when they come one after the other. */
-#define UNDISTURBED_MS 100.0
 #define PART_SHARE 0.06 /* of a render's time, for pictures of it on the way */
 
 struct turn {
+    struct turn_order order; /* first: found again from it */
+    struct account *account; /* the order's */
     struct worker_turns *turns;
     struct pen_render *render; /* NULL: unused */
     struct worker_item *item;
-    struct account *account;
-    uint64_t arrived;
-    double ms;
 };
 
 struct worker_turns {
@@ -65,7 +60,7 @@ static struct worker_item *finish(struct worker_turns *t, struct turn *turn)
     struct pen_result *result = &item->message.result;
     if (!pen_render_end(turn->render, &result->error) && result->error.code == PEN_OK)
         pen_fail(&result->error, PEN_INTERNAL, "", "The render failed without saying why.");
-    result->turns_ms = turn->ms;
+    result->turns_ms = turn->order.ms;
     accounts_leave(t->accounts, turn->account, clock_now_ns());
     if (t->current == turn)
         t->current = NULL;
@@ -109,41 +104,27 @@ bool worker_turns_begin(struct worker_turns *t, const struct pen_request *reques
             render, request->delivery.budget_ms, (double)item->best_until_ns / CLOCK_MS);
     if (item->measure == MEASURE_PICTURE && !item->fresh)
         pen_render_continue(render);
-    *turn = (struct turn){.turns = t,
+    struct account *account =
+        accounts_enter(t->accounts, client ? client : ~number, /* nobody is called so */
+            batch, clock_now_ns());
+    *turn = (struct turn){.order = {.account = account, .arrived = number},
+        .account = account,
+        .turns = t,
         .render = render,
-        .item = item,
-        .account = accounts_enter(t->accounts, client ? client : ~number, /* nobody is called so */
-            batch, clock_now_ns()),
-        .arrived = number};
+        .item = item};
     return true;
-}
-
-static bool comes_before(const struct turn *a, const struct turn *b)
-{
-    double used[] = {a->account->used_ms, b->account->used_ms};
-    /* Of one client, what has had least goes first: short ones are done before long ones, seen from
-     * whichever side they came. */
-    if (a->account == b->account)
-        used[0] = floor(a->ms / UNDISTURBED_MS), used[1] = floor(b->ms / UNDISTURBED_MS);
-    return used[0] != used[1] ? used[0] < used[1] : a->arrived < b->arrived;
 }
 
 uint64_t worker_turns_next(struct worker_turns *t)
 {
-    struct turn *best = NULL;
-    bool interactive = false;
-    for (uint32_t i = 0; i < PEN_MAX_RENDERS; i++) {
-        struct turn *turn = &t->turns[i];
-        if (!turn->render)
-            continue;
-        interactive |= !turn->account->batch;
-        if (!best || comes_before(turn, best))
-            best = turn;
-    }
-    bool stays = t->current && t->current->ms < UNDISTURBED_MS &&
-                 (!t->current->account->batch || !interactive);
-    if (!stays)
-        t->current = best;
+    const struct turn_order *orders[PEN_MAX_RENDERS];
+    uint32_t count = 0;
+    for (uint32_t i = 0; i < PEN_MAX_RENDERS; i++)
+        if (t->turns[i].render)
+            orders[count++] = &t->turns[i].order;
+    /* The order is a turn's first member. */
+    t->current =
+        (struct turn *)turn_order_next(orders, count, t->current ? &t->current->order : NULL);
     return t->current ? t->current->item->message.job : 0;
 }
 
@@ -158,7 +139,7 @@ struct worker_item *worker_turns_run(struct worker_turns *t)
     uint64_t start = clock_now_ns();
     bool ended = pen_render_advance(turn->render, WORKER_TURN_MS);
     double ms = clock_ms(clock_now_ns() - start);
-    turn->ms += ms;
+    turn->order.ms += ms;
     accounts_charge(t->accounts, turn->account, ms);
     if (ended)
         return finish(t, turn);

@@ -1,6 +1,6 @@
 # The front end's parts, without HTTP and without a renderer.
 if(PENUMBRA_DAEMON)
-    foreach(part file jobs scheduler fairness overload homes multipart cache store settings channel auto
+    foreach(part file jobs scheduler fairness turns overload homes multipart cache store settings channel auto
             framing)
         penumbra_unit_test(server_${part} ${CMAKE_CURRENT_LIST_DIR}/server_${part}.c
             LIBS penumbra_server)

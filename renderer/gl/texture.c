@@ -4,6 +4,8 @@
 
 static struct gl_account *charged;
 static uint64_t deleted; /* there is one GL thread */
+static struct gl_texture spares[16];
+#define SPARES (sizeof spares / sizeof *spares)
 
 struct gl_account *gl_textures_charge(struct gl_account *account)
 {
@@ -80,6 +82,21 @@ static uint32_t texel_bytes(GLenum format)
     }
 }
 
+/* A spare one of that shape; false: there is none. */
+static bool take_spare(struct gl_texture *t)
+{
+    for (size_t i = 0; i < SPARES; i++) {
+        struct gl_texture *s = &spares[i];
+        if (!s->name || s->target != t->target || s->format != t->format || s->width != t->width ||
+            s->height != t->height || s->layers != t->layers || s->levels != t->levels)
+            continue;
+        t->name = s->name;
+        s->name = 0;
+        return true;
+    }
+    return false;
+}
+
 struct gl_texture gl_texture_create(
     GLenum format, uint32_t width, uint32_t height, uint32_t layers, uint32_t levels)
 {
@@ -101,6 +118,8 @@ struct gl_texture gl_texture_create(
         t.layers = layers = layers ? 1 : 0;
         t.bytes = texel_bytes(format);
     }
+    if (take_spare(&t))
+        return t;
     gl.CreateTextures(t.target, 1, &t.name);
     GLsizei n = (GLsizei)t.levels, w = (GLsizei)width, h = (GLsizei)height;
     if (layers)
@@ -144,6 +163,24 @@ void gl_texture_destroy(struct gl_texture *texture)
         gl_deleted_add(texture->bytes);
     }
     memset(texture, 0, sizeof *texture);
+}
+
+void gl_texture_recycle(struct gl_texture *texture)
+{
+    for (size_t i = 0; i < SPARES && texture->name; i++) {
+        if (spares[i].name)
+            continue;
+        gl_texture_release_account(texture);
+        spares[i] = *texture;
+        texture->name = 0;
+    }
+    gl_texture_destroy(texture);
+}
+
+void gl_textures_forget(void)
+{
+    for (size_t i = 0; i < SPARES; i++)
+        gl_texture_destroy(&spares[i]);
 }
 
 GLuint gl_framebuffer_create(

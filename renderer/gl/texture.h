@@ -38,6 +38,10 @@ struct gl_texture gl_texture_create(
 struct gl_texture gl_texture_create_samples(
     GLenum format, uint32_t width, uint32_t height, uint32_t samples);
 void gl_texture_destroy(struct gl_texture *texture);
+/* As destroy, but the next one of that shape may be made of it (its texels are anything then), until
+ * gl_textures_forget. */
+void gl_texture_recycle(struct gl_texture *texture);
+void gl_textures_forget(void);
 
 /* Of what was deleted since gl_deleted_forget: textures, and what others add. */
 void gl_deleted_add(uint64_t bytes);

@@ -75,6 +75,43 @@ static void check_eviction(void)
     pen_renderer_destroy(r);
 }
 
+/* Of many lights, each asked for once, software keeps the maps of the last frames, or as many as a share
+ * of the budget holds, and draws the next ones into the oldest of them: the pictures are those of maps
+ * made for them. */
+static void check_recycling(void)
+{
+    struct pen_error error;
+    const uint64_t budget = 512ull << 20;
+    const char *methods[] = {"pcss", "msm", "hard"};
+    enum { LIGHTS = 30 };
+    struct pen_request request;
+    struct pen_result result;
+    uint8_t id[PEN_ID_BYTES];
+    for (int m = 0; m < 3; m++) {
+        struct pen_renderer *r = fixture_renderer(PEN_DEVICE_SURFACELESS, budget, &error);
+        uint64_t pictures[LIGHTS], one = 0;
+        fixture_scene(r, PEN_GENERATED_HAIRBALL, 2000, 1, id);
+        for (int i = 0; i < LIGHTS; i++) {
+            fixture_request(&request, id, methods[m]);
+            request.camera.mode = PEN_CAMERA_ORBIT; /* whose light moves with it */
+            request.camera.azimuth_deg = 11.0f * (float)i;
+            pictures[i] = fixture_render(r, &request, &result);
+            CHECK(!result.shadow_inputs_reused);
+            one = one ? one : result.gpu_bytes;
+            uint64_t kept = budget / 8 > 9 * one ? budget / 8 : 9 * one;
+            CHECK(result.gpu_bytes <= kept + one);
+        }
+        pen_renderer_destroy(r);
+        for (int i = LIGHTS - 3; i < LIGHTS; i++) {
+            r = fixture_renderer(PEN_DEVICE_SURFACELESS, budget, &error);
+            fixture_scene(r, PEN_GENERATED_HAIRBALL, 2000, 1, id);
+            request.camera.azimuth_deg = 11.0f * (float)i;
+            CHECK(fixture_render(r, &request, &result) == pictures[i]);
+            pen_renderer_destroy(r);
+        }
+    }
+}
+
 /* Textures that were deleted leave the memory of the process, and nothing else changes. */
 static void check_release(const struct pen_renderer *r)
 {
@@ -231,6 +268,7 @@ int main(void)
     check_drop(r, id);
     pen_renderer_destroy(r);
     check_eviction();
+    check_recycling();
     check_hierarchy();
     check_host_hierarchy();
     CHECK_DONE();

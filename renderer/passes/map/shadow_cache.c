@@ -3,6 +3,11 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* An input that one frame has used, so many frames ago, is taken for one whose light has moved on, when
+ * those that no frame in progress uses have such a share of the memory. */
+#define OLD_FRAMES 8
+#define KEPT_SHARE 8
+
 /* What of a face and a request changes a shadow input: everything but the view and the emission. */
 struct face_key {
     mat4 world_to_light;
@@ -18,13 +23,13 @@ struct entry {
     struct face_key face;
     struct shadow_key key;
     struct shadow_input input;
-    uint64_t bytes, last_use;
+    uint64_t bytes, last_use, first_frame, last_frame;
     uint32_t lanes; /* a bit for each whose frame uses it */
 };
 
 struct shadow_cache {
     struct entry *entries; /* most recently made first; a handful, so a list will do */
-    uint64_t bytes, clock;
+    uint64_t bytes, clock, frames;
     struct gl_account
         building; /* inputs that are not finished, and what is used up by making them */
     uint32_t built[SHADOW_CACHE_LANES]; /* in the frame of each lane */
@@ -38,12 +43,18 @@ struct shadow_cache *shadow_cache_create(
     return cache;
 }
 
-static void free_entry(struct shadow_cache *cache, struct entry *e)
+static void end_entry(
+    struct shadow_cache *cache, struct entry *e, void (*end)(struct gl_texture *texture))
 {
     for (int i = 0; i < SHADOW_INPUT_TEXTURES; i++)
-        gl_texture_destroy(&e->input.textures[i]);
+        end(&e->input.textures[i]);
     cache->bytes -= e->bytes;
     free(e);
+}
+
+static void free_entry(struct shadow_cache *cache, struct entry *e)
+{
+    end_entry(cache, e, gl_texture_destroy);
 }
 
 void shadow_cache_destroy(struct shadow_cache *cache)
@@ -73,7 +84,39 @@ static void make_face_key(const struct light_face *face, uint32_t casters, struc
 static void use(struct shadow_cache *cache, struct entry *e, uint32_t lane)
 {
     e->last_use = ++cache->clock;
+    e->last_frame = cache->frames;
     e->lanes |= 1u << lane;
+}
+
+static bool is_alike(const struct shadow_key *a, const struct shadow_key *b)
+{
+    return a->size == b->size && !strcmp(a->kind, b->kind) &&
+           !memcmp(a->extra, b->extra, sizeof a->extra);
+}
+
+/* A rasteriser in software gets new memory from the system for every map, which has to be cleared, and
+ * takes longer than small maps take to be drawn. Where the light moves, a new input is made of the
+ * textures of an old one. */
+static void recycle_one(struct technique_run *run, const struct shadow_key *key)
+{
+    struct shadow_cache *cache = run->ctx->shadows;
+    struct entry **oldest = NULL;
+    uint64_t idle = 0;
+    for (struct entry **at = &cache->entries; *at; at = &(*at)->next) {
+        struct entry *e = *at;
+        if (e->lanes)
+            continue;
+        idle += e->bytes;
+        if (e->scene == run->scene && is_alike(&e->key, key) && e->first_frame == e->last_frame &&
+            e->last_frame + OLD_FRAMES <= cache->frames &&
+            (!oldest || e->last_use < (*oldest)->last_use))
+            oldest = at;
+    }
+    if (!oldest || !run->ctx->software || idle <= run->ctx->gpu_memory / KEPT_SHARE)
+        return;
+    struct entry *e = *oldest;
+    *oldest = e->next;
+    end_entry(cache, e, gl_texture_recycle);
 }
 
 const struct shadow_input *shadow_cache_get(struct technique_run *run, const struct shadow_key *key,
@@ -84,20 +127,21 @@ const struct shadow_input *shadow_cache_get(struct technique_run *run, const str
     make_face_key(run->face, run->request->casters, &face);
     for (struct entry *e = cache->entries; e; e = e->next)
         if (e->scene == run->scene && !memcmp(&e->pose, &run->scene->pose, sizeof e->pose) &&
-            e->key.size == key->size && !strcmp(e->key.kind, key->kind) &&
-            !memcmp(e->key.extra, key->extra, sizeof key->extra) &&
-            !memcmp(&e->face, &face, sizeof face)) {
+            is_alike(&e->key, key) && !memcmp(&e->face, &face, sizeof face)) {
             use(cache, e, run->ctx->lane);
             return &e->input;
         }
+    recycle_one(run, key);
     struct entry *e = pen_alloc_zero(1, sizeof *e);
     e->scene = run->scene;
     e->pose = run->scene->pose;
     e->face = face;
     e->key = *key;
+    e->first_frame = cache->frames;
     struct gl_account *before = gl_textures_charge(&cache->building);
     bool ok = build(run, key, &e->input, error);
     gl_textures_charge(before);
+    gl_textures_forget();
     for (int i = 0; i < SHADOW_INPUT_TEXTURES; i++) {
         gl_texture_release_account(&e->input.textures[i]);
         e->bytes += e->input.textures[i].bytes;
@@ -164,6 +208,7 @@ void shadow_cache_drop_scene(struct shadow_cache *cache, const struct scene *sce
 void shadow_cache_begin_frame(const struct technique_ctx *ctx)
 {
     ctx->shadows->built[ctx->lane] = 0;
+    ctx->shadows->frames++;
     shadow_cache_release(ctx);
 }
 

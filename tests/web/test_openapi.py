@@ -43,10 +43,10 @@ class OpenApi(unittest.TestCase):
 
     def test_types_of_the_javascript_client(self):
         """Its comments are types that hold, and they are those of the document."""
-        for name in ("penumbra.js", "types.py"):
+        for name in ("penumbra.js", "schema_types.py"):
             shutil.copy(os.path.join(MODULES, name), self.work)
         shutil.copy(os.path.join(HERE, "typed_use.ts"), self.work)
-        subprocess.run([sys.executable, "-B", "types.py", "openapi.json", "schemas.d.ts"],
+        subprocess.run([sys.executable, "-B", "schema_types.py", "openapi.json", "schemas.d.ts"],
                        cwd=self.work, check=True)
         strict = ("--strict", "--target", "es2022", "--module", "esnext", "--moduleResolution",
                   "bundler", "--lib", "es2023,dom,dom.iterable,dom.asynciterable")

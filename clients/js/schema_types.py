@@ -1,11 +1,11 @@
 """schemas.d.ts: the documents of /openapi.json as TypeScript.
 
-usage: types.py OPENAPI_JSON OUTPUT"""
+usage: schema_types.py OPENAPI_JSON OUTPUT"""
 import json
 import re
 import sys
 
-HEAD = "// Made by clients/js/types.py from /openapi.json.\n"
+HEAD = "// Made by clients/js/schema_types.py from /openapi.json.\n"
 PLAIN = {"string": "string", "number": "number", "integer": "number", "boolean": "boolean",
          "null": "null"}
 

@@ -4,7 +4,7 @@
 #include "server/base/log.h"
 #include "server/base/status.h"
 #include "server/wire/address.h"
-#include "server/wire/peers.h"
+#include "server/wire/crowd.h"
 #include "server/wire/spares.h"
 #include <errno.h>
 #include <poll.h>
@@ -21,12 +21,11 @@
 
 #define TICK_MS 100
 #define BACKLOG 512
-#define EVENTS 256
+#define EVENTS 64
 #define ACCEPTED_AT_ONCE 64
-#define PEERS 1024   /* a power of two */
-#define MAX_DYING 64 /* beyond the connections: they were refused, and are to hear of it */
-#define FRESH_NS (250 * CLOCK_MS) /* until an upload's rate can be told */
-#define PAIR 2                    /* descriptors of a request, besides its client's */
+#define SLOW_AT_ONCE 16 /* of those that are slow, then the quick have their turn */
+#define MAX_DYING 64    /* beyond the connections: they were refused, and are to hear of it */
+#define PAIR 2          /* descriptors of a request, besides its client's */
 
 struct door {
     struct door_config config;
@@ -38,11 +37,7 @@ struct door {
     struct spares spares;
     pthread_t thread;
     bool started;
-    /* The thread's: all links, and whose they are. */
-    struct link **links;
-    uint32_t count;
-    size_t capacity;
-    struct peers peers;
+    struct crowd crowd; /* the thread's, as is: */
     struct link *buried;
 
     pthread_mutex_t lock; /* guards everything below */
@@ -75,13 +70,10 @@ static void bury(struct door *door, struct link *link)
     if (link->buried)
         return;
     link->buried = true;
-    peers_leave(&door->peers, link->peer);
+    crowd_leave(&door->crowd, link);
     pthread_mutex_lock(&door->lock);
     door->numbers.open--;
     pthread_mutex_unlock(&door->lock);
-    struct link *last = door->links[--door->count];
-    door->links[link->place] = last;
-    last->place = link->place;
     link->next_buried = door->buried;
     door->buried = link;
 }
@@ -107,53 +99,15 @@ static void pump(struct door *door, struct link *link, uint32_t events)
 {
     if (!link->buried)
         link_pump(link, events);
+    crowd_look(&door->crowd, link);
     if (link->state == LINK_DEAD)
         bury(door, link);
 }
 
-/* Whom to look for among the links. */
-struct wanted {
-    const struct peer *peer; /* NULL: of any address */
-    bool uploads;            /* with a body that takes up a place */
-    bool dying;              /* also those that only linger: for their descriptors */
-};
-
-static bool is_wanted(const struct link *link, const struct wanted *wanted)
-{
-    bool uploads =
-        link->state == LINK_BODY && __atomic_load_n(&link->notes, __ATOMIC_ACQUIRE) & LINK_UPLOADS;
-    return (!wanted->peer || link->peer == wanted->peer) && (!wanted->uploads || uploads) &&
-           (wanted->dying || link->state < LINK_ENDING);
-}
-
-/* Who has kept a place the longest for little, at the address that has most; NULL: nobody has. */
-static struct link *find_idlest(struct door *door, const struct wanted *wanted)
-{
-    uint64_t now = clock_now_ns(), longest = 0;
-    struct link *found = NULL;
-    for (uint32_t i = 0; i < door->count; i++) {
-        struct link *link = door->links[i];
-        uint64_t idle = is_wanted(link, wanted) ? link_idleness(link, now) : 0;
-        if (wanted->uploads && idle < FRESH_NS)
-            continue;
-        bool dying = idle == UINT64_MAX, among_dying = longest == UINT64_MAX;
-        bool more = !found                 ? idle > 0
-                    : dying != among_dying ? dying
-                    : link->peer->count != found->peer->count
-                        ? link->peer->count > found->peer->count
-                        : idle > longest;
-        if (!idle || !more)
-            continue;
-        found = link;
-        longest = idle;
-    }
-    return found;
-}
-
 /* Makes room; false: everybody is needed where they are. */
-static bool displace(struct door *door, const struct wanted *wanted)
+static bool displace(struct door *door, const struct crowd_wanted *wanted)
 {
-    struct link *link = find_idlest(door, wanted);
+    struct link *link = crowd_find_idlest(&door->crowd, wanted, clock_now_ns());
     struct pen_error error = {0};
     if (!link)
         return false;
@@ -168,6 +122,7 @@ static bool displace(struct door *door, const struct wanted *wanted)
     }
     if (link->state != LINK_LINGERING || wanted->dying)
         link_cut(link);
+    crowd_look(&door->crowd, link);
     if (link->state == LINK_DEAD)
         bury(door, link);
     return true;
@@ -243,27 +198,17 @@ static void turn_away(struct door *door, struct link *link, bool of_address)
     link_refuse(link, &error);
 }
 
-/* Connections that are not on their way out, of an address or (NULL) all. */
-static uint32_t count_live(const struct door *door, const struct peer *peer)
-{
-    uint32_t live = 0;
-    for (uint32_t i = 0; i < door->count; i++)
-        live += door->links[i]->state < LINK_ENDING && (!peer || door->links[i]->peer == peer);
-    return live;
-}
-
 static void admit(struct door *door, int fd, const struct sockaddr_storage *from)
 {
     const struct door_config *config = &door->config;
     struct in6_addr address = address_network(from);
-    struct peer *peer = peers_enter(&door->peers, &address);
-    const struct wanted of_address = {.peer = peer}, of_all = {0}, descriptors = {.dying = true};
-    bool crowded =
-        count_live(door, peer) >= config->connections_per_address && !displace(door, &of_address);
-    bool fits = !crowded &&
-                (count_live(door, NULL) < config->connections || displace(door, &of_all)) &&
+    struct peer *peer = peers_enter(&door->crowd.peers, &address);
+    const struct crowd_wanted of_address = {.peer = peer}, of_all = {0},
+                              descriptors = {.dying = true};
+    bool crowded = peer->live >= config->connections_per_address && !displace(door, &of_address);
+    bool fits = !crowded && (door->crowd.live < config->connections || displace(door, &of_all)) &&
                 (fd <= door->links_config.highest - PAIR || displace(door, &descriptors));
-    if (door->count > config->connections + MAX_DYING)
+    if (door->crowd.count > config->connections + MAX_DYING)
         displace(door, &descriptors);
     pthread_mutex_lock(&door->lock);
     struct tls *tls = config->tls ? tls_create(config->tls, fd) : NULL;
@@ -272,10 +217,7 @@ static void admit(struct door *door, int fd, const struct sockaddr_storage *from
     door->numbers.open++;
     pthread_mutex_unlock(&door->lock);
     struct link *link = link_create(&door->links_config, fd, from, tls);
-    link->peer = peer;
-    link->place = door->count;
-    door->links = pen_grow(door->links, &door->capacity, door->count + 1, sizeof *door->links);
-    door->links[door->count++] = link;
+    crowd_enter(&door->crowd, link, peer);
     if (lost)
         link_cut(link);
     else if (!fits)
@@ -305,7 +247,7 @@ static void accept_some(struct door *door, uint32_t most)
         if (starved && !helped) {
             /* Those in the queue have waited long enough: somebody else makes room, or a spare. */
             helped = true;
-            displace(door, &(struct wanted){.dying = true});
+            displace(door, &(struct crowd_wanted){.dying = true});
             free_buried(door);
             spares_give(&door->spares, 1);
             continue;
@@ -336,15 +278,17 @@ static void listen_or_not(struct door *door, bool deaf)
 static void reap(struct door *door)
 {
     uint32_t uploads = 0;
-    for (uint32_t i = door->count; i-- > 0;) {
-        struct link *link = door->links[i];
-        link_check(link, clock_now_ns());
+    uint64_t now = clock_now_ns();
+    for (uint32_t i = door->crowd.count; i-- > 0;) {
+        struct link *link = door->crowd.links[i];
+        link_check(link, now);
+        crowd_look(&door->crowd, link);
         uploads += link->state == LINK_BODY &&
                    __atomic_load_n(&link->notes, __ATOMIC_ACQUIRE) & LINK_UPLOADS;
         if (link->state == LINK_DEAD)
             bury(door, link);
     }
-    const struct wanted slow_uploads = {.uploads = true};
+    const struct crowd_wanted slow_uploads = {.uploads = true};
     while (door->config.uploads && uploads > door->config.uploads && displace(door, &slow_uploads))
         uploads--;
     spares_fill(&door->spares);
@@ -373,11 +317,46 @@ static void look_at_notes(struct door *door)
 
 static void close_idle(struct door *door)
 {
-    for (uint32_t i = door->count; i-- > 0;) {
-        if (door->links[i]->state > LINK_HEAD)
+    for (uint32_t i = door->crowd.count; i-- > 0;) {
+        if (door->crowd.links[i]->state > LINK_HEAD)
             continue;
-        link_cut(door->links[i]);
-        bury(door, door->links[i]);
+        link_cut(door->crowd.links[i]);
+        bury(door, door->crowd.links[i]);
+    }
+}
+
+/* Newcomers and who is quick come first: of those that keep their places for little only some, and the
+ * rest when epoll names them again. */
+static void serve(struct door *door, const struct epoll_event *events, int count)
+{
+    bool knocked = false, noted = false;
+    uint64_t now = clock_now_ns();
+    for (int i = 0; i < count; i++) {
+        knocked = knocked || events[i].data.ptr == &door->listen_fd;
+        noted = noted || events[i].data.ptr == &door->wake;
+    }
+    if (noted)
+        look_at_notes(door);
+    if (knocked && door->listen_fd >= 0)
+        accept_some(door, ACCEPTED_AT_ONCE);
+    if (knocked && door->deaf)
+        listen_or_not(door, true);
+    uint64_t slow = 0; /* bits: of the events */
+    for (int i = 0; i < count; i++) {
+        struct link_ear *ear = events[i].data.ptr;
+        if (events[i].data.ptr == &door->listen_fd || events[i].data.ptr == &door->wake)
+            continue;
+        if (link_idleness(ear->link, now) > CROWD_FRESH_NS && !ear->inner)
+            slow |= 1ull << i;
+        else
+            pump(door, ear->link, ear->inner ? 0 : events[i].events);
+    }
+    for (int i = 0, served = 0; i < count && served < SLOW_AT_ONCE; i++) {
+        const struct link_ear *ear = events[i].data.ptr;
+        if (!(slow >> i & 1))
+            continue;
+        pump(door, ear->link, events[i].events);
+        served++;
     }
 }
 
@@ -388,20 +367,7 @@ static void *run(void *argument)
     for (bool stopping = false; !stopping;) {
         struct epoll_event events[EVENTS];
         int n = epoll_wait(door->epoll, events, EVENTS, TICK_MS);
-        bool knocked = false;
-        for (int i = 0; i < n; i++) {
-            struct link_ear *ear = events[i].data.ptr;
-            if (events[i].data.ptr == &door->listen_fd)
-                knocked = true;
-            else if (events[i].data.ptr == &door->wake)
-                look_at_notes(door);
-            else
-                pump(door, ear->link, ear->inner ? 0 : events[i].events);
-        }
-        if (knocked && door->listen_fd >= 0)
-            accept_some(door, ACCEPTED_AT_ONCE);
-        if (knocked && door->deaf)
-            listen_or_not(door, true);
+        serve(door, events, n);
         free_buried(door);
         uint64_t now = clock_now_ns();
         if (now - last_reap > TICK_MS * CLOCK_MS) {
@@ -556,9 +522,9 @@ void door_destroy(struct door *door)
         close(door->listen_fd);
     for (struct link *link = door->noted; link; link = link->next_noted)
         link->noted = false;
-    while (door->count) {
-        link_cut(door->links[door->count - 1]);
-        bury(door, door->links[door->count - 1]);
+    while (door->crowd.count) {
+        link_cut(door->crowd.links[door->crowd.count - 1]);
+        bury(door, door->crowd.links[door->crowd.count - 1]);
     }
     free_buried(door);
     spares_finish(&door->spares);
@@ -567,7 +533,7 @@ void door_destroy(struct door *door)
     close(door->epoll);
     pthread_mutex_destroy(&door->lock);
     pthread_cond_destroy(&door->closed_changed);
-    free(door->links);
+    crowd_finish(&door->crowd);
     free(door->far);
     free(door);
 }

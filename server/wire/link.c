@@ -438,6 +438,7 @@ void link_pump(struct link *link, uint32_t events)
         moved = (link->state != LINK_DEAD && read_inner(link)) || moved;
         moved = (link->state != LINK_DEAD && write_client(link)) || moved;
     }
+    link->unfinished = moved;
     if (link->state != LINK_DEAD)
         listen_anew(link);
 }
@@ -488,6 +489,7 @@ void link_check(struct link *link, uint64_t now)
     uint64_t age = now - link->since_ns, sending = link->sending_ns ? now - link->sending_ns : 0;
     struct pen_error late = {0};
     bool too_slow = false;
+    enum link_state before = link->state;
     switch (link->state) {
     case LINK_WAITING:
         if (link->served && age > config->keep_alive_ms * CLOCK_MS)
@@ -521,7 +523,7 @@ void link_check(struct link *link, uint64_t now)
         config->refused(config->context, link, &late, "-");
         link_cut(link);
     }
-    if (link->state != LINK_DEAD)
+    if (link->state != LINK_DEAD && (link->unfinished || link->state != before))
         link_pump(link, 0);
 }
 

@@ -73,11 +73,13 @@ struct link {
     uint64_t sending_ns, sent;   /* since when bytes wait for the client; 0: none do */
     uint64_t moved_ns;           /* when the last of them went */
     bool served, answered, continued, eof, eof_told, deaf, over;
-    uint32_t notes; /* atomic: enum link_note */
+    bool unfinished; /* there was more to move than a turn allows */
+    uint32_t notes;  /* atomic: enum link_note */
     /* The door's. */
     struct peer *peer;
+    struct link *before, *after; /* of the peer's */
     struct link *next_noted, *next_buried;
-    bool noted, buried;
+    bool noted, buried, live;
     uint32_t place;
 };
 

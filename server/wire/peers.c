@@ -19,6 +19,10 @@ struct peer *peers_enter(struct peers *peers, const struct in6_addr *address)
     if (!*at) {
         *at = pen_alloc_zero(1, sizeof **at);
         (*at)->address = *address;
+        (*at)->after = peers->first;
+        if (peers->first)
+            peers->first->before = *at;
+        peers->first = *at;
     }
     (*at)->count++;
     return *at;
@@ -30,5 +34,11 @@ void peers_leave(struct peers *peers, struct peer *peer)
         return;
     struct peer **at = find(peers, &peer->address);
     *at = peer->next;
+    if (peer->before)
+        peer->before->after = peer->after;
+    else
+        peers->first = peer->after;
+    if (peer->after)
+        peer->after->before = peer->before;
     free(peer);
 }

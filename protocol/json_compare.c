@@ -183,7 +183,7 @@ static void write_links(struct pen_json *json, const struct pen_compared *row)
     pen_json_object(json, "links");
     for (size_t i = 0; i < sizeof links / sizeof *links; i++)
         if (links[i].href)
-            pen_json_string(json, links[i].key, links[i].href);
+            pen_json_link(json, links[i].key, links[i].href);
     pen_json_end(json);
 }
 

@@ -76,7 +76,7 @@ char *pen_result_json(const struct pen_result *result, const struct pen_record_e
     pen_request_write(&json, "request", completed, catalogue);
     pen_json_object(&json, "image");
     if (extra->image_href)
-        pen_json_string(&json, "href", extra->image_href);
+        pen_json_link(&json, "href", extra->image_href);
     if (extra->etag)
         pen_json_string(&json, "etag", extra->etag);
     pen_json_string(&json, "type", pen_format_mime[completed->output.format]);

@@ -22,11 +22,10 @@ static void put_text(struct pen_json *json, const char *text)
     put(json, text, strlen(text));
 }
 
-static void put_quoted(struct pen_json *json, const char *text)
+static void put_escaped(struct pen_json *json, const char *text)
 {
     const unsigned char *s = (const unsigned char *)text;
     size_t left = strlen(text);
-    put(json, "\"", 1);
     while (left) {
         size_t length = pen_utf8_length((const char *)s, left);
         char escape[8];
@@ -47,6 +46,12 @@ static void put_quoted(struct pen_json *json, const char *text)
         s += length;
         left -= length;
     }
+}
+
+static void put_quoted(struct pen_json *json, const char *text)
+{
+    put(json, "\"", 1);
+    put_escaped(json, text);
     put(json, "\"", 1);
 }
 
@@ -107,6 +112,31 @@ void pen_json_string(struct pen_json *json, const char *key, const char *text)
         put_quoted(json, text);
     else
         put_text(json, "null");
+}
+
+void pen_json_link(struct pen_json *json, const char *key, const char *path)
+{
+    static const char begin[] = {'"', PEN_JSON_LINK};
+    begin_item(json, key);
+    put(json, begin, sizeof begin);
+    put_escaped(json, path);
+    put(json, "\"", 1);
+}
+
+char *pen_json_put_links(char *text, const char *prefix)
+{
+    struct pen_json out = {0};
+    const char *from = text, *mark;
+    while ((mark = strchr(from, PEN_JSON_LINK))) {
+        put(&out, from, (size_t)(mark - from));
+        put_escaped(&out, prefix);
+        from = mark + 1;
+    }
+    if (from == text)
+        return text;
+    put_text(&out, from);
+    free(text);
+    return out.text;
 }
 
 void pen_json_float(struct pen_json *json, const char *key, float value)

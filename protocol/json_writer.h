@@ -19,6 +19,12 @@ void pen_json_array(struct pen_json *json, const char *key);
 void pen_json_end(struct pen_json *json);
 
 void pen_json_string(struct pen_json *json, const char *key, const char *text); /* NULL: null */
+/* A link to a path of this service. Where that is offered is known to who sends the document: until then
+ * PEN_JSON_LINK, which nothing else in a document can be, stands before it. */
+#define PEN_JSON_LINK '\x1a'
+void pen_json_link(struct pen_json *json, const char *key, const char *path);
+/* The document with `prefix` ("", or "/path") before each link; takes the text. */
+char *pen_json_put_links(char *text, const char *prefix);
 void pen_json_float(struct pen_json *json, const char *key, float value);   /* not finite: null */
 void pen_json_double(struct pen_json *json, const char *key, double value); /* not finite: null */
 void pen_json_int(struct pen_json *json, const char *key, int64_t value);

@@ -78,16 +78,29 @@ bool guard_host(const struct guard *guard, const char *host, struct pen_error *e
                name);
 }
 
-/* Whether a page of this origin is one of this service's own, or of those that may call it. */
-static bool may_call(const struct guard *guard, const char *origin, const char *host)
+/* Whether a page comes from where the request went: Host may name the scheme's port, Origin does not. */
+static bool is_from_here(
+    const char *origin, const char *authority, const char *host, const char *scheme)
 {
+    size_t bytes = (size_t)(authority - origin), length = strlen(authority + 3);
+    const char *port = bytes == 5 && !strncasecmp(origin, "https", 5) ? ":443" : ":80";
+    if (scheme && (strlen(scheme) != bytes || strncasecmp(origin, scheme, bytes)))
+        return false;
+    return !strncasecmp(authority + 3, host, length) &&
+           (!host[length] || !strcmp(host + length, port));
+}
+
+/* Whether a page of this origin is one of this service's own, or of those that may call it. */
+static bool may_call(const struct guard *guard, const struct guard_request *request)
+{
+    const char *origin = request->origin, *host = request->host;
     char name[MAX_NAME];
     if (!strcmp(guard->origin, "*") || (*guard->origin && !strcasecmp(guard->origin, origin)))
         return true;
     const char *authority = strstr(origin, "://");
     if (!authority || !read_name(authority + 3, name))
         return false; /* "null": a sandbox, a file, a redirection */
-    return (host && !strcasecmp(authority + 3, host)) ||
+    return (host && is_from_here(origin, authority, host, request->scheme)) ||
            (strcmp(guard->names, "*") && is_listed(guard->names, name));
 }
 
@@ -100,7 +113,7 @@ bool guard_page(
     if (!changes || request->authorization)
         return true;
     bool own = site ? !strcmp(site, "same-origin") || !strcmp(site, "none") : !request->origin;
-    return own || (request->origin && may_call(guard, request->origin, request->host)) ||
+    return own || (request->origin && may_call(guard, request)) ||
            pen_fail(error, PEN_FORBIDDEN, "",
                "Pages of %.200s may not do this here. If they should: --cors-origin.",
                request->origin ? request->origin : "other sites");

@@ -13,6 +13,7 @@ struct guard {
 /* Headers; NULL: not there. */
 struct guard_request {
     const char *method, *host, *origin, *site, *authorization;
+    const char *scheme; /* "http" or "https", of the client's side of a proxy; NULL: not known */
 };
 
 /* Always let through: addresses, names of one label and those under localhost, local and internal,

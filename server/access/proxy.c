@@ -7,8 +7,6 @@
 #include <string.h>
 #include <strings.h>
 
-#define LINK "\"/v1/"
-
 /* IPv4 addresses are taken as they stand in IPv6. */
 static bool read_address(const char *text, struct in6_addr *address)
 {
@@ -130,6 +128,16 @@ bool proxy_prefix(const char *path, char prefix[PROXY_PREFIX_BYTES])
     return true;
 }
 
+const char *proxy_scheme(const char *text)
+{
+    static const char *const schemes[] = {"http", "https"};
+    size_t bytes = text ? strcspn(text, ":, ") : 0;
+    for (int i = 0; i < 2; i++)
+        if (strlen(schemes[i]) == bytes && !strncasecmp(text, schemes[i], bytes))
+            return schemes[i];
+    return NULL;
+}
+
 bool proxy_split_url(const char *url, char host[PROXY_NAME_BYTES], char prefix[PROXY_PREFIX_BYTES],
     struct pen_error *error)
 {
@@ -145,25 +153,4 @@ bool proxy_split_url(const char *url, char host[PROXY_NAME_BYTES], char prefix[P
     memcpy(host, url + scheme, name);
     host[name] = 0;
     return true;
-}
-
-char *proxy_put_links(char *text, const char *prefix)
-{
-    size_t count = 0, step = strlen(prefix);
-    if (!step)
-        return text;
-    for (const char *at = text; (at = strstr(at, LINK)); at++)
-        count++;
-    char *all = pen_alloc(strlen(text) + count * step + 1, 1), *to = all;
-    const char *from = text;
-    for (const char *at = text; (at = strstr(at, LINK)); at++) {
-        if (at > text && at[-1] == '\\')
-            continue; /* within somebody's text */
-        to = (char *)memcpy(to, from, (size_t)(at + 1 - from)) + (at + 1 - from);
-        to = stpcpy(to, prefix);
-        from = at + 1;
-    }
-    strcpy(to, from);
-    free(text);
-    return all;
 }

@@ -15,7 +15,7 @@ bool proxy_client(const char *list, const char *forwarded, char client[64]);
 /* The path in "https://host/path/", without its last slash; "" for the root. Errors: PEN_INVALID. */
 bool proxy_split_url(const char *url, char host[PROXY_NAME_BYTES], char prefix[PROXY_PREFIX_BYTES],
     struct pen_error *error);
+/* The scheme in X-Forwarded-Proto (NULL: not there), or that a URL begins with; NULL: none that is known. */
+const char *proxy_scheme(const char *text);
 /* X-Forwarded-Prefix, NULL: not there. False when it is no path. */
 bool proxy_prefix(const char *forwarded, char prefix[PROXY_PREFIX_BYTES]);
-/* A JSON document whose links ("/v1/...") begin with the prefix; takes the text. */
-char *proxy_put_links(char *text, const char *prefix);

@@ -121,7 +121,8 @@ static const struct row rows[] = {
         .help = "What others call this service, behind a proxy: its name is taken, and links begin "
                 "with its path."),
     ROW(trusted_proxy, "", .form = "ADDRESSES",
-        .help = "Proxies, as addresses or networks with commas, whose X-Forwarded-For, -Host and "
+        .help = "Proxies, as addresses or networks with commas, whose X-Forwarded-For, -Host, "
+                "-Proto and "
                 "-Prefix are believed."),
     ROW(worker_path, "", FILE_NAME, .help = "penumbra-worker; empty: next to penumbrad."),
     ROW(import_path, "", FILE_NAME, .help = "penumbra-import; empty: next to penumbrad."),

@@ -72,7 +72,7 @@ void *call_work(struct call *call, size_t bytes, void (*end)(struct call *call, 
 
 bool call_json(struct call *call, uint32_t status, char *text)
 {
-    text = proxy_put_links(text, call->prefix);
+    text = pen_json_put_links(text, call->prefix);
     http_answer(call->exchange, status, "application/json", http_text(text));
     return true;
 }

@@ -45,6 +45,7 @@ struct call {
     struct call_note note;
     char prefix[PROXY_PREFIX_BYTES]; /* that links begin with, "" for none */
     const char *host;                /* that the client asked, or NULL */
+    const char *scheme;              /* and how: "http", "https", NULL: not known */
 };
 
 /* Whose the jobs are that it asks for and about: the same after a restart. */

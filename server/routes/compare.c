@@ -207,7 +207,7 @@ static char *whole(struct call *call)
 /* Takes the data. */
 static void put(struct comparing *c, const char *event, char *data)
 {
-    data = proxy_put_links(data, c->call->prefix);
+    data = pen_json_put_links(data, c->call->prefix);
     int bytes = asprintf(&c->text, "event: %s\ndata: %s\n\n", event, data);
     if (bytes < 0)
         abort();

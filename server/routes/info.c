@@ -131,14 +131,6 @@ static void write_limits(struct pen_json *json, const struct config *config)
     pen_json_end(json);
 }
 
-static void write_link(
-    struct pen_json *json, const struct call *call, const char *key, const char *path)
-{
-    char link[PROXY_PREFIX_BYTES + 32];
-    snprintf(link, sizeof link, "%s%s", call->prefix, path);
-    pen_json_string(json, key, link);
-}
-
 bool route_service(struct call *call, struct pen_error *error)
 {
     (void)error;
@@ -175,14 +167,14 @@ bool route_service(struct call *call, struct pen_error *error)
     pen_json_uint(&json, "gpu_bytes", pool.gpu_bytes);
     write_limits(&json, s->config);
     pen_json_object(&json, "links");
-    write_link(&json, call, "openapi", "/openapi.json");
-    write_link(&json, call, "docs", "/docs");
-    pen_json_string(&json, "techniques", "/v1/techniques");
-    pen_json_string(&json, "scenes", "/v1/scenes");
-    pen_json_string(&json, "images", "/v1/images");
-    pen_json_string(&json, "jobs", "/v1/jobs");
-    pen_json_string(&json, "stats", "/v1/stats");
-    pen_json_string(&json, "events", "/v1/events");
+    pen_json_link(&json, "openapi", "/openapi.json");
+    pen_json_link(&json, "docs", "/docs");
+    pen_json_link(&json, "techniques", "/v1/techniques");
+    pen_json_link(&json, "scenes", "/v1/scenes");
+    pen_json_link(&json, "images", "/v1/images");
+    pen_json_link(&json, "jobs", "/v1/jobs");
+    pen_json_link(&json, "stats", "/v1/stats");
+    pen_json_link(&json, "events", "/v1/events");
     pen_json_end(&json);
     pen_json_end(&json);
     http_add_header(call->exchange, "Cache-Control", "no-store");

@@ -76,18 +76,18 @@ static void append_frame(
     pen_json_object(&json, NULL);
     pen_json_uint(&json, "frame", frame->number);
     pen_json_uint(&json, "bytes", frame->file.bytes);
-    pen_json_string(&json, "href", href);
+    pen_json_link(&json, "href", href);
     pen_json_uint(&json, "done", done);
     pen_json_uint(&json, "total", job->frames);
     pen_json_end(&json);
-    char *data = proxy_put_links(pen_json_finish(&json, NULL), e->prefix);
+    char *data = pen_json_put_links(pen_json_finish(&json, NULL), e->prefix);
     append(e, frame->seq, "frame", data);
     free(data);
 }
 
 static void append_state(struct events *e, const struct job *job)
 {
-    char *data = job_json(job);
+    char *data = pen_json_put_links(job_json(job), e->prefix);
     append(e, job->state_seq, "state", data);
     free(data);
 }

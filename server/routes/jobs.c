@@ -1,6 +1,8 @@
 /* Jobs: starting sequences, listing, describing, cancelling, and what they give. */
 #include "protocol/json_result.h"
 #include "protocol/json_sequence.h"
+#include "protocol/json_writer.h"
+#include "protocol/memory.h"
 #include "server/auto/choice.h"
 #include "server/http/accept.h"
 #include "server/http/range.h"
@@ -143,31 +145,60 @@ static void add_expiry(struct call *call, const struct job *job)
     http_add_header(call->exchange, "Cache-Control", "private, max-age=%lld", left > 0 ? left : 0);
 }
 
+/* A document that was kept, with its links as they lead from here; NULL: see *error. */
+static char *read_document(
+    struct call *call, const struct job *job, const struct job_file *file, struct pen_error *error)
+{
+    int fd = jobs_open_file(call->service->jobs, job->id, file, true, error);
+    if (fd < 0)
+        return NULL;
+    char *text = pen_alloc(file->bytes + 1, 1);
+    ssize_t n = pread(fd, text, file->bytes, 0);
+    close(fd);
+    if (n != (ssize_t)file->bytes) {
+        free(text);
+        pen_fail(error, PEN_UNAVAILABLE, "", "The document could not be read.");
+        return NULL;
+    }
+    text[n] = 0;
+    return pen_json_put_links(text, call->prefix);
+}
+
 static bool send_file(
     struct call *call, const struct job *job, const struct job_file *file, struct pen_error *error)
 {
     struct http_exchange *x = call->exchange;
-    uint64_t from = 0, count = file->bytes;
+    const char *mime = mime_of(file->name);
+    bool is_document = !strcmp(mime, "application/json");
+    char *text = is_document ? read_document(call, job, file, error) : NULL;
+    if (is_document && !text)
+        return false;
+    uint64_t bytes = text ? strlen(text) : file->bytes, from = 0, count = bytes;
     enum range range = range_read(
-        http_header(x, "Range"), http_header(x, "If-Range"), file->tag, file->bytes, &from, &count);
+        http_header(x, "Range"), http_header(x, "If-Range"), file->tag, bytes, &from, &count);
     add_expiry(call, job);
     http_add_header(x, "Accept-Ranges", "bytes");
-    if (call_not_modified(call, file->tag))
+    bool known = call_not_modified(call, file->tag);
+    if (known || range == RANGE_OUTSIDE)
+        free(text);
+    if (known)
         return true;
     if (range == RANGE_OUTSIDE) {
-        http_add_header(x, "Content-Range", "bytes */%llu", (unsigned long long)file->bytes);
-        return pen_fail(
-            error, PEN_RANGE, "", "There are %llu bytes.", (unsigned long long)file->bytes);
+        http_add_header(x, "Content-Range", "bytes */%llu", (unsigned long long)bytes);
+        return pen_fail(error, PEN_RANGE, "", "There are %llu bytes.", (unsigned long long)bytes);
     }
     bool checked = range == RANGE_ALL && file->bytes <= MOST_CHECKED_BYTES;
-    int fd = jobs_open_file(call->service->jobs, job->id, file, checked, error);
+    int fd = text ? 0 : jobs_open_file(call->service->jobs, job->id, file, checked, error);
     if (fd < 0)
         return false;
     if (range == RANGE_PART)
         http_add_header(x, "Content-Range", "bytes %llu-%llu/%llu", (unsigned long long)from,
-            (unsigned long long)(from + count - 1), (unsigned long long)file->bytes);
-    http_answer_file(x, range == RANGE_PART ? 206 : 200, mime_of(file->name),
-        (struct http_file){fd, from, count});
+            (unsigned long long)(from + count - 1), (unsigned long long)bytes);
+    uint32_t status = range == RANGE_PART ? 206 : 200;
+    if (text)
+        http_answer(x, status, mime, (struct http_body){text + from, count, free, text});
+    else
+        http_answer_file(x, status, mime, (struct http_file){fd, from, count});
     return true;
 }
 

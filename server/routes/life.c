@@ -53,7 +53,8 @@ static enum step_end guard(struct call *call, struct pen_error *error)
         .host = call->host,
         .origin = http_header(x, "Origin"),
         .site = http_header(x, "Sec-Fetch-Site"),
-        .authorization = http_header(x, "Authorization")};
+        .authorization = http_header(x, "Authorization"),
+        .scheme = call->scheme};
     return guard_host(&own, request.host, error) && guard_page(&own, &request, error) ? STEP_NEXT
                                                                                       : STEP_FAILED;
 }
@@ -239,6 +240,7 @@ static void find_client(struct call *call)
     const char *proxies = s->config->trusted_proxy;
     strcpy(call->prefix, s->public_prefix);
     call->host = http_header(x, "Host");
+    call->scheme = *s->config->tls_cert ? "https" : proxy_scheme(s->config->public_url);
     if (!proxy_is_listed(proxies, x->client))
         return;
     const char *prefix = http_header(x, "X-Forwarded-Prefix");
@@ -246,8 +248,11 @@ static void find_client(struct call *call)
     char said[PROXY_PREFIX_BYTES];
     if (prefix && proxy_prefix(prefix, said))
         strcpy(call->prefix, said);
+    const char *scheme = proxy_scheme(http_header(x, "X-Forwarded-Proto"));
     if (host)
         call->host = host;
+    if (scheme)
+        call->scheme = scheme;
     proxy_client(proxies, http_header(x, "X-Forwarded-For"), x->client);
 }
 

@@ -79,5 +79,5 @@ void page_write_next(struct pen_json *json, const char *path, const char *const 
         for (const char *c = page->values[k]; *c; c++)
             out += sprintf(out, "%%%02x", (unsigned char)*c);
     }
-    pen_json_string(json, "next", next);
+    pen_json_link(json, "next", next);
 }

@@ -242,8 +242,8 @@ static char *make_record(struct parts *p, bool is_last)
     struct service *s = p->service;
     const struct call *call = p->config.call;
     const struct auto_render *choice = p->config.choice;
-    char href[HREF_BYTES + PROXY_PREFIX_BYTES];
-    snprintf(href, sizeof href, "%s/v1/results/%s", call->prefix, p->shown->tag);
+    char href[HREF_BYTES];
+    snprintf(href, sizeof href, "/v1/results/%s", p->shown->tag);
     const struct pen_progress *progress = &p->shown->result.progress;
     bool stateful = pen_request_is_stateful(&p->shown->result.completed, s->catalogue);
     bool complete = is_last && progress->done >= progress->total && !stateful;
@@ -257,7 +257,8 @@ static char *make_record(struct parts *p, bool is_last)
         .from_cache = call->note.cached,
         .choice = *choice->why ? choice->why : NULL,
         .choice_met = choice->met};
-    return pen_result_json(&p->shown->result, &extra, s->catalogue);
+    return pen_json_put_links(
+        pen_result_json(&p->shown->result, &extra, s->catalogue), call->prefix);
 }
 
 static void put_event(struct parts *p, bool is_last)

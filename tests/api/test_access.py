@@ -149,6 +149,25 @@ class Access(unittest.TestCase):
                 record = d.exchange("POST", scene.removeprefix("/shadows") + "/render", json.dumps(SMALL),
                                     {**said, "Accept": "application/json"}).json()
                 self.assertIn('"%s/v1/results/' % prefix, json.dumps(record))
+                # What only looks like a link stays as it is.
+                d.exchange("PATCH", scene.removeprefix("/shadows"), json.dumps({"name": "/v1/name"}),
+                           {**said, "Content-Type": "application/merge-patch+json"})
+                self.assertIn("/v1/name", [s["name"] for s in d.exchange(
+                    "GET", "/v1/scenes", headers=said).json()["scenes"]])
+                # A comparison that is kept, and what is told of it.
+                asked = d.exchange("POST", scene.removeprefix("/shadows") + "/compare", json.dumps(
+                    {"width": 32, "height": 24, "techniques": ["hard"], "reference": {"name": "pcf"}}),
+                    {**said, "Prefer": "respond-async"})
+                job = asked.headers["Location"]
+                told = wait(lambda: (s := follow(d, job).json())["state"] == "successful" and s)
+                result = follow(d, told["links"]["result"])
+                rows = result.json()
+                links = {*told["links"].values(), rows["reference"]["links"]["image"]}
+                self.assertEqual([link for link in links if not link.startswith(prefix + "/v1/")], [])
+                self.assertEqual(int(result.headers["Content-Length"]), len(result.body))
+                self.assertEqual(follow(d, told["links"]["result"], Range="bytes=5-").body, result.body[5:])
+                events = d.exchange("GET", job.removeprefix("/shadows") + "/events", headers=said).body
+                self.assertEqual(events.count(b'"/v1/'), 0 if prefix else events.count(b'/v1/'))
                 if "--public-url" in str(flags):  # a proxy that leaves the path as it is
                     self.assertEqual(d.exchange("GET", "/shadows/v1/scenes").status, 200)
                     named = d.exchange("GET", "/v1", headers={"Host": "renders.example"})

@@ -89,7 +89,8 @@ static void check_answer(void)
     results[1].stage_ms[PEN_STAGE_ENCODE] = 100; /* not the method's */
     struct pen_compared rows[3] = {{.result = &results[0], .image = "/v1/results/a"},
         {.result = &results[1], .ssim_map = "/m"}, {.result = &results[2]}};
-    char *text = pen_compare_json(&compare, rows, "id", 12, &fake_catalogue);
+    char *text =
+        pen_json_put_links(pen_compare_json(&compare, rows, "id", 12, &fake_catalogue), "");
     cJSON *root = cJSON_Parse(text);
     cJSON *methods = cJSON_GetObjectItem(root, "methods");
     cJSON *first = cJSON_GetArrayItem(methods, 0), *second = cJSON_GetArrayItem(methods, 1);

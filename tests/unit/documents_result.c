@@ -184,7 +184,7 @@ static void test_record(void)
     result.class_pixels[1] = 17;
     result.gpu_bytes = 1ull << 40;
     result.scene_was_resident = 1;
-    cJSON *root = parsed(pen_result_json(&result, &extra, &fake_catalogue));
+    cJSON *root = parsed(pen_json_put_links(pen_result_json(&result, &extra, &fake_catalogue), ""));
     CHECK_NEAR(at(root, "request.width")->valuedouble, 800, 0);
     CHECK_STR(at(root, "request.technique.name")->valuestring, "pcss");
     CHECK(!strncmp(at(root, "scene")->valuestring, "ab000", 5));

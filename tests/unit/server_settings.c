@@ -211,9 +211,13 @@ static void test_proxy(void)
     CHECK_STR(host, "a.example");
     CHECK_STR(prefix, "/x");
     CHECK(!proxy_split_url("a.example", host, prefix, NULL));
-    char *text = proxy_put_links(strdup("{\"/v1/a\":\"/v1/b\",\"c\":\"x \\\"/v1/\"}"), "/p");
-    CHECK_STR(text, "{\"/p/v1/a\":\"/p/v1/b\",\"c\":\"x \\\"/v1/\"}");
-    free(text);
+    const char *schemes[][2] = {{"https", "https"}, {"HTTP", "http"}, {"https, http", "https"},
+        {"http://a.example/x", "http"}, {"https://a", "https"}, {"", NULL}, {NULL, NULL},
+        {"ftp", NULL}, {"httpsx", NULL}, {"http s", "http"}};
+    for (size_t i = 0; i < sizeof schemes / sizeof *schemes; i++) {
+        const char *found = proxy_scheme(schemes[i][0]);
+        CHECK(schemes[i][1] ? found && !strcmp(found, schemes[i][1]) : !found);
+    }
 }
 
 static void test_auth(void)
@@ -337,6 +341,14 @@ static void test_pages(void)
         {{"PUT", "h:1", "https://a.example", "cross-site", NULL}, false, true, true},
         {{"POST", "h:1", "http://evil.example", "cross-site", "Bearer x"}, true, true, true},
         {{"GET", "h:1", "http://evil.example", "cross-site", NULL}, true, true, true},
+        {{"POST", "h", "https://h", NULL, NULL, "https"}, true, true, true},
+        {{"POST", "h", "http://h", NULL, NULL, "https"}, false, false, true},
+        {{"POST", "h:443", "https://h", NULL, NULL, "https"}, true, true, true},
+        {{"POST", "h:443", "https://h", NULL, NULL, NULL}, true, true, true},
+        {{"POST", "h:80", "https://h", NULL, NULL, NULL}, false, false, true},
+        {{"POST", "h:80", "http://h", NULL, NULL, NULL}, true, true, true},
+        {{"POST", "h:8", "http://h", NULL, NULL, NULL}, false, false, true},
+        {{"POST", "hh", "http://h", NULL, NULL, NULL}, false, false, true},
     };
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         struct pen_error error = {0};

@@ -8,7 +8,7 @@ static void write_link(struct pen_json *json, const char *key, const char *id, c
 {
     char link[PEN_ID_HEX + 32];
     snprintf(link, sizeof link, "/v1/jobs/%s%s", id, rest);
-    pen_json_string(json, key, link);
+    pen_json_link(json, key, link);
 }
 
 void job_write(struct pen_json *json, const char *key, const struct job *job)

@@ -11,10 +11,15 @@
 #define RESERVE 1.2
 #define RESERVE_OF_SEVERAL 1.35
 
-/* What one takes until the next of its client can be begun. */
-static double ratio_of(const struct scheduler *s, const struct render *render)
+/* How many times as long as it takes of the renderer one is in the way of another: measurements of a
+ * client are made one after the other, each until it is done, and whatever else is there goes on beside
+ * them. */
+static double ratio_of(
+    const struct scheduler *s, const struct render *render, const struct render *other)
 {
-    return render->measure == MEASURE_PICTURE ? 1 : s->measured_ratio;
+    bool wait = render->measure != MEASURE_PICTURE && other->measure != MEASURE_PICTURE &&
+                render->payer == other->payer;
+    return wait ? s->measured_ratio : 1;
 }
 
 void scheduler_learn_ratio(struct scheduler *s, double renderer_ms, double run_ms)
@@ -35,7 +40,7 @@ void scheduler_pace(struct scheduler *s, const struct render *render, bool count
 {
     uint64_t now = s->limits.now_ns();
     double took = clock_ms(now - s->paced_ns);
-    double foreseen = ratio_of(s, render) * render->estimate.sure * render->estimate.least_ms;
+    double foreseen = render->estimate.sure * render->estimate.least_ms;
     s->paced_ns = now;
     counts &= foreseen > 0;
     took = counts ? took : fmax(0, took - ms); /* it was in the way of those that count */
@@ -73,7 +78,7 @@ static double left_ms(const struct scheduler *s, const struct render *r, double 
         return 0;
     if (r->running) /* at most: it shared the renderer with the others */
         ms -= clock_ms(now - r->taken_ns) / fmax(1, s->numbers.running);
-    ms = ratio_of(s, r) * (fmax(0, ms) + r->following_ms);
+    ms = fmax(0, ms) + r->following_ms;
     return fmax(0, fmin(ms, clock_ms(r->last_deadline_ns - now)));
 }
 
@@ -103,15 +108,17 @@ uint32_t scheduler_retry_s(const struct scheduler *s)
  * for longer than its own renders take, times what the other's time counts less; of its own client's
  * those that are queued come first, and those that run give way until it has had as much. Only what
  * is known counts, and as far as it is sure. */
-static double wait_ms(const struct scheduler *s, uint64_t payer, bool batch, double own_ms)
+static double wait_ms(const struct scheduler *s, const struct render *render, double own_ms)
 {
+    const uint64_t payer = render->payer;
+    const bool batch = render->batch;
     const struct render *lists[] = {s->queue[0], s->running};
     double mine = own_ms, ms = 0;
     for (struct account *a = accounts_first(s->accounts); a; a = a->next)
         a->backlog_ms = 0;
     for (int l = 0; l < 2; l++)
         for (const struct render *r = lists[l]; r; r = r->next) {
-            double left = r->estimate.sure * left_ms(s, r, 0);
+            double left = ratio_of(s, r, render) * r->estimate.sure * left_ms(s, r, 0);
             bool own = r->payer == payer && r->batch == batch;
             if (own) {
                 left = r->running ? fmin(left, own_ms) : left;
@@ -134,18 +141,21 @@ static double wait_ms(const struct scheduler *s, uint64_t payer, bool batch, dou
  * takes too long even alone is let in: its estimate may be wrong. What it takes itself, and so how far
  * others are in its way, counts only as far as like ones on its own scene have shown: others' dear
  * renders tell nothing of it. */
-bool scheduler_is_late(struct scheduler *s, const struct render *render, uint64_t payer,
-    const struct waiter *waiter, struct pen_error *error)
+bool scheduler_is_late(struct scheduler *s, struct render *render, const struct waiter *waiter,
+    struct pen_error *error)
 {
     uint64_t now = s->limits.now_ns();
     double left = waiter->deadline_ns > now ? clock_ms(waiter->deadline_ns - now) : 0;
     double own = waiter->best ? 0 : render->estimate.sure * render->estimate.least_ms;
-    own = pace(s) * ratio_of(s, render) * (own + render->following_sure_ms);
+    own = pace(s) * ratio_of(s, render, render) * (own + render->following_sure_ms);
     double most = waiter->following_count ? left : left / 2; /* many say more than one */
     double reserve = waiter->following_count ? RESERVE_OF_SEVERAL : RESERVE;
-    double wait = reserve * pace(s) * wait_ms(s, payer, render->batch, own / pace(s));
+    double wait = reserve * pace(s) * wait_ms(s, render, own / pace(s));
     double over = wait + fmin(reserve * own, most) - left;
-    if (!(wait > 0 && over > 0) || estimates_doubt(s->estimates, &render->request, now))
+    if (!(wait > 0 && over > 0))
+        return false;
+    render->trial = estimates_doubt(s->estimates, &render->request, now);
+    if (render->trial)
         return false;
     pen_fail(error, PEN_UNAVAILABLE, "/deadline_ms",
         "What was asked for before takes about %.1f s: this would not be ready in time.",
@@ -158,15 +168,17 @@ bool scheduler_is_hopeless(const struct scheduler *s, const struct render *rende
 {
     uint64_t now = s->limits.now_ns();
     double own = render->estimate.sure * render->estimate.least_ms + render->following_sure_ms;
-    double needs = ratio_of(s, render) * own;
-    if (render->continues || render->best_until_ns || render->last_deadline_ns < now)
+    double needs = ratio_of(s, render, render) * own;
+    if (render->continues || render->trial || render->best_until_ns ||
+        render->last_deadline_ns < now)
         return false;
     const struct render *before[] = {s->running, s->queue[0]};
     bool others = false;
     for (int l = 0; l < 2; l++)
         for (const struct render *r = before[l]; r && r != render; r = r->next)
             if (r->payer == render->payer && r->batch == render->batch) {
-                needs += r->estimate.sure * left_ms(s, r, 0) / fmax(1, s->limits.workers);
+                needs += ratio_of(s, r, render) * r->estimate.sure * left_ms(s, r, 0) /
+                         fmax(1, s->limits.workers);
                 others = true;
             }
     return others && pace(s) * needs > clock_ms(render->last_deadline_ns - now);

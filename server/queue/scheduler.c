@@ -173,6 +173,7 @@ bool scheduler_submit(struct scheduler *s, const struct pen_request *request,
     struct render *fresh = pen_alloc_zero(1, sizeof *fresh);
     pthread_mutex_lock(&s->lock);
     set_up(fresh, request, waiter, estimates_of(s->estimates, request, s->limits.now_ns()));
+    fresh->payer = payer;
     scheduler_foresee(s, fresh, waiter);
     uint32_t held = waiter->client ? shares_held(s->shares, waiter->client) : 0;
     struct render *render = shareable ? find_key(s, key) : NULL;
@@ -184,7 +185,7 @@ bool scheduler_submit(struct scheduler *s, const struct pen_request *request,
     } else if (!render && !fresh->continues && !fresh->background && is_full(s)) {
         s->numbers.refused_full++;
         pen_fail(error, PEN_UNAVAILABLE, "", "The queue is full.");
-    } else if (!render && !fresh->continues && scheduler_is_late(s, fresh, payer, waiter, error)) {
+    } else if (!render && !fresh->continues && scheduler_is_late(s, fresh, waiter, error)) {
         s->numbers.refused_late++;
     } else {
         if (waiter->client)

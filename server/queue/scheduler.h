@@ -58,6 +58,7 @@ struct render {
     uint64_t last_deadline_ns;
     uint64_t best_until_ns; /* of a waiter who takes what there is; 0: there is none */
     bool shareable, running, batch, fresh, continues, background;
+    bool trial; /* let in to see whether it is as late as it seems */
     uint32_t measure;
     int reference_fd;                  /* the render's own; 0: none */
     uint32_t attempts, kills, starved; /* kept by the worker pool */

@@ -40,8 +40,8 @@ void scheduler_foresee(
 double scheduler_backlog_ms(const struct scheduler *s, double unknown_ms);
 /* When about half of what is there is done. */
 uint32_t scheduler_retry_s(const struct scheduler *s);
-bool scheduler_is_late(struct scheduler *s, const struct render *render, uint64_t payer,
-    const struct waiter *waiter, struct pen_error *error);
+bool scheduler_is_late(struct scheduler *s, struct render *render, const struct waiter *waiter,
+    struct pen_error *error);
 /* One that was measured took so much of the renderer, and so long until it was done. */
 void scheduler_learn_ratio(struct scheduler *s, double renderer_ms, double run_ms);
 /* A render begins, with nothing under way, or has ended; `counts`: it was made as it was foreseen to be. */

@@ -1,7 +1,9 @@
 /* More is asked for than can be done: what is let in is done in time, whatever a render takes beside its
- * time on the renderer. A clock of its own, a renderer that divides itself among four renders, and
- * requests that come as a Poisson process does. */
+ * time on the renderer, and who is not let in hears it at once; also with comparisons among the renders. A
+ * clock of its own, a renderer that divides itself among four renders, and requests that come as a Poisson
+ * process does. */
 #include "server/base/clock.h"
+#include "server/queue/compare.h"
 #include "server/queue/scheduler.h"
 #include "tests/unit/check.h"
 #include <math.h>
@@ -11,6 +13,7 @@
 #define AT_ONCE 4
 #define MOST 8000
 #define DEADLINE_MS 5000
+#define MEASURED 3 /* renders of a comparison */
 
 static uint64_t now_ns = CLOCK_S;
 static uint64_t fake_now(void)
@@ -23,16 +26,43 @@ struct client {
     uint32_t answers, code;
 };
 
-static uint32_t good, late, turned_away;
+/* What became of them. */
+struct tally {
+    uint32_t good, late, at_once;
+    uint32_t afterwards; /* let in, and then refused */
+};
+static struct tally renders, comparisons;
+
+static void count(struct tally *tally, const struct pen_error *error)
+{
+    tally->good += error->code == PEN_OK;
+    tally->late += error->code == PEN_DEADLINE;
+    tally->afterwards += error->code == PEN_UNAVAILABLE;
+    CHECK(error->code != PEN_UNAVAILABLE || error->retry_after_s > 0);
+}
+
+static void refuse(struct tally *tally, const struct pen_error *error)
+{
+    CHECK(error->code == PEN_UNAVAILABLE && error->retry_after_s > 0);
+    tally->at_once++;
+}
+
+static bool is_over; /* the rest is cancelled */
 
 static void finish(struct waiter *waiter, const struct outcome *outcome)
 {
     struct client *client = (struct client *)waiter;
     client->answers++;
-    good += outcome->error.code == PEN_OK;
-    late += outcome->error.code == PEN_DEADLINE;
-    turned_away += outcome->error.code == PEN_UNAVAILABLE;
-    CHECK(outcome->error.code != PEN_UNAVAILABLE || outcome->error.retry_after_s > 0);
+    if (!is_over)
+        count(&renders, &outcome->error);
+}
+
+static void compared(void *owner, struct compare *compare, const struct pen_error *error)
+{
+    (void)owner;
+    if (!is_over)
+        count(&comparisons, error);
+    compare_destroy(compare);
 }
 
 static void on_work(void *context)
@@ -40,9 +70,20 @@ static void on_work(void *context)
     (void)context;
 }
 
+struct flight {
+    struct render *render;
+    double left_ms, turns_ms;
+};
+static struct flight flights[AT_ONCE];
+
+/* Those of comparisons come one after the other. */
 static enum take fits(void *context, struct render *render)
 {
-    (void)context, (void)render;
+    (void)context;
+    for (int i = 0; i < AT_ONCE; i++)
+        if (flights[i].render && flights[i].render->measure != MEASURE_PICTURE &&
+            render->measure != MEASURE_PICTURE)
+            return TAKE_LATER;
     return TAKE_FITS;
 }
 
@@ -53,105 +94,170 @@ static double uniform(void)
     return ((double)(state >> 11) + 0.5) * 0x1p-53;
 }
 
-struct flight {
-    struct render *render;
-    double left_ms;
+/* What is asked for, how often, and what it takes. */
+struct load {
+    double rate;       /* requests a second */
+    double compared;   /* share of comparisons */
+    double takes_ms;   /* a render */
+    double told;       /* share of that which is told as the renderer's */
+    double measure_ms; /* beside the renderer, of each image of a comparison */
 };
 
-/* The renderer does its part of `ms` for each that it has; what is done, or not wanted, leaves. */
-static void work(struct scheduler *s, struct flight *flights, double ms, double turns_ms)
+static uint32_t in_flight(void)
 {
-    int count = 0;
+    uint32_t n = 0;
     for (int i = 0; i < AT_ONCE; i++)
-        count += flights[i].render != NULL;
+        n += flights[i].render != NULL;
+    return n;
+}
+
+/* The renderer does its part of `ms` for each that it has; what is done, or not wanted, leaves. */
+static void work(struct scheduler *s, double ms)
+{
+    uint32_t n = in_flight();
     for (int i = 0; i < AT_ONCE; i++) {
         struct flight *f = &flights[i];
-        if (!f->render)
+        struct render *render = f->render;
+        if (!render)
             continue;
-        f->left_ms -= ms / count;
-        struct pen_result result = {.turns_ms = turns_ms};
+        f->left_ms -= ms / n;
+        struct pen_result result = {.turns_ms = f->turns_ms};
         struct outcome outcome = {.result = &result};
-        if (!scheduler_is_wanted(s, f->render)) {
+        if (!scheduler_is_wanted(s, render)) {
             result.turns_ms = 1;
             pen_fail(&outcome.error, PEN_LOST, "", "Nobody waits for it.");
         } else if (f->left_ms > 1e-6) {
             continue;
         }
-        scheduler_finish(s, f->render, &outcome);
         f->render = NULL;
+        scheduler_finish(s, render, &outcome);
     }
 }
 
-static void feed(struct scheduler *s, struct flight *flights, double takes_ms)
+static void feed(struct scheduler *s, const struct load *load)
 {
     for (int i = 0; i < AT_ONCE; i++) {
-        if (flights[i].render)
+        struct flight *f = &flights[i];
+        struct render *render =
+            f->render ? NULL : scheduler_take(s, &(struct taker){fits, NULL, 0});
+        if (!render)
             continue;
-        flights[i].render = scheduler_take(s, &(struct taker){fits, NULL, 0});
-        flights[i].left_ms = takes_ms;
+        double measure_ms = render->measure == MEASURE_PICTURE ? 0 : load->measure_ms;
+        *f = (struct flight){render, load->takes_ms + measure_ms, load->told * load->takes_ms};
     }
 }
 
-/* `rate` requests a second for so long; a render takes `takes_ms`, of which turns_ms are told. */
-static void flood(
-    struct scheduler *s, double rate, double seconds, double takes_ms, double turns_ms)
+static void ask(struct scheduler *s, const struct load *load)
 {
     static struct client clients[MOST];
-    struct flight flights[AT_ONCE] = {0};
-    struct pen_request request = {.technique = "pcss", .width = 100, .height = 100, .antialias = 1};
+    static struct pen_request requests[MEASURED];
+    static uint32_t next;
+    struct pen_error error = {0};
+    uint64_t deadline_ns = now_ns + DEADLINE_MS * MS;
+    for (int i = 0; i < MEASURED; i++)
+        requests[i] =
+            (struct pen_request){.technique = "pcss", .width = 100, .height = 100, .antialias = 1};
+    if (uniform() < load->compared) {
+        struct compare_plan plan = {.requests = requests,
+            .count = MEASURED,
+            .client = 1,
+            .deadline_ns = deadline_ns,
+            .done = compared};
+        if (!compare_start(s, &plan, &error))
+            refuse(&comparisons, &error);
+        return;
+    }
+    struct client *client = &clients[next++ % MOST];
+    *client =
+        (struct client){.waiter = {.client = 1, .deadline_ns = deadline_ns, .finish = finish}};
+    if (!scheduler_submit(
+            s, &requests[0], (uint8_t[PEN_ID_BYTES]){0}, false, &client->waiter, &error))
+        refuse(&renders, &error);
+}
+
+static void flood(struct scheduler *s, const struct load *load, double seconds)
+{
     double due_ms = 0, at_ms = 0;
     uint64_t began = now_ns;
-    uint32_t next = 0;
-    good = late = turned_away = 0;
+    renders = comparisons = (struct tally){0};
     while (at_ms < 1e3 * seconds) {
-        int count = 0;
         double step = due_ms - at_ms;
-        feed(s, flights, takes_ms);
-        for (int i = 0; i < AT_ONCE; i++)
-            count += flights[i].render != NULL;
+        feed(s, load);
         for (int i = 0; i < AT_ONCE; i++)
             if (flights[i].render)
-                step = fmin(step, flights[i].left_ms * count);
+                step = fmin(step, flights[i].left_ms * in_flight());
         step = fmax(step, 1e-3);
         at_ms += step;
         now_ns = began + (uint64_t)(at_ms * 1e6);
         scheduler_expire(s);
-        work(s, flights, step, turns_ms);
+        work(s, step);
         if (at_ms < due_ms)
             continue;
-        due_ms += -log(uniform()) * 1e3 / rate;
-        CHECK(next < MOST);
-        struct client *client = &clients[next++];
-        struct pen_error error = {0};
-        memset(client, 0, sizeof *client);
-        client->waiter = (struct waiter){
-            .client = 1, .deadline_ns = now_ns + DEADLINE_MS * MS, .finish = finish};
-        if (!scheduler_submit(
-                s, &request, (uint8_t[PEN_ID_BYTES]){0}, false, &client->waiter, &error)) {
-            CHECK(error.code == PEN_UNAVAILABLE && error.retry_after_s > 0);
-            turned_away++;
-        }
+        due_ms += -log(uniform()) * 1e3 / load->rate;
+        ask(s, load);
     }
+    is_over = true;
     scheduler_cancel(s);
-    work(s, flights, 0, turns_ms);
+    work(s, 0);
+    is_over = false;
+}
+
+static struct scheduler *make(void)
+{
+    struct scheduler_limits limits = {
+        .queue = 256, .client_share = 0, .workers = 1, .now_ns = fake_now};
+    return scheduler_create(&limits, on_work, NULL);
+}
+
+static void test_renders(double times, double told)
+{
+    struct scheduler *s = make();
+    struct load load = {.rate = 5, .takes_ms = 100, .told = told};
+    double seconds = 60, most = 1e3 / load.takes_ms * seconds;
+    flood(s, &load, 10); /* what it costs is learned */
+    load.rate = times * 1e3 / load.takes_ms;
+    flood(s, &load, seconds);
+    printf("%.1f times, %.1f told: %u good of %.0f, %u late, %u refused at once, %u afterwards\n",
+        times, told, renders.good, most, renders.late, renders.at_once, renders.afterwards);
+    CHECK(renders.good >= 0.9 * most);
+    CHECK(renders.late <= 0.05 * most);
+    scheduler_destroy(s);
+}
+
+/* One of twenty is a comparison, whose images take their time beside the renderer, too. */
+static void test_mixed(double times, double measure_ms)
+{
+    struct scheduler *s = make();
+    struct load load = {
+        .rate = 5, .compared = 0.05, .takes_ms = 40, .told = 0.8, .measure_ms = measure_ms};
+    double whole_ms = MEASURED * (load.takes_ms + measure_ms), seconds = 120;
+    double mean_ms = 0.95 * load.takes_ms + 0.05 * whole_ms;
+    flood(s, &load, 20);
+    load.rate = times * 1e3 / mean_ms;
+    flood(s, &load, seconds);
+    const struct tally *r = &renders, *c = &comparisons;
+    double used_ms = r->good * load.takes_ms + c->good * whole_ms;
+    uint32_t refused = r->at_once + r->afterwards + c->at_once + c->afterwards;
+    printf("%.0f times, %.0f ms: renders %u good, %u late, %u + %u refused; comparisons %u, %u, %u "
+           "+ %u; "
+           "%.2f of the time\n",
+        times, measure_ms, r->good, r->late, r->at_once, r->afterwards, c->good, c->late,
+        c->at_once, c->afterwards, used_ms / (1e3 * seconds));
+    CHECK(used_ms >= 0.9 * 1e3 * seconds);
+    CHECK(c->good > 0);
+    CHECK(r->late + c->late <= 0.02 * (r->good + c->good));
+    CHECK(r->afterwards + c->afterwards <= 0.01 * refused);
+    scheduler_destroy(s);
 }
 
 int main(void)
 {
     static const double told[] = {1, 0.6, 0.3};
     for (int i = 0; i < 3; i++)
-        for (double times = 1.5; times < 4; times *= 2) {
-            struct scheduler_limits limits = {
-                .queue = 256, .client_share = 0, .workers = 1, .now_ns = fake_now};
-            struct scheduler *s = scheduler_create(&limits, on_work, NULL);
-            double takes_ms = 100, seconds = 60, most = 1e3 / takes_ms * seconds;
-            flood(s, 5, 10, takes_ms, told[i] * takes_ms); /* what it costs is learned */
-            flood(s, times * 10, seconds, takes_ms, told[i] * takes_ms);
-            printf("%.1f times, %.1f told: %u good of %.0f, %u late, %u turned away\n", times,
-                told[i], good, most, late, turned_away);
-            CHECK(good >= 0.9 * most);
-            CHECK(late <= 0.05 * most);
-            scheduler_destroy(s);
-        }
+        for (double times = 1.5; times < 4; times *= 2)
+            test_renders(times, told[i]);
+    for (double times = 2; times < 4; times++)
+        for (double measure_ms = 20; measure_ms < 100; measure_ms *= 2)
+            test_mixed(times, measure_ms);
     CHECK_DONE();
 }

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #define SCHEMA "#/components/schemas/"
+#define EXAMPLE_ID "0123456789abcdef0123456789abcdef0123456789abcdef0123456789abcdef"
 
 static void write_ref(struct pen_json *json, const char *key, const char *target)
 {
@@ -14,12 +15,31 @@ static void write_ref(struct pen_json *json, const char *key, const char *target
     pen_json_end(json);
 }
 
+/* That of a schema, or NULL. */
+static const char *example_of(const char *schema)
+{
+    static const struct {
+        const char *schema, *json;
+    } examples[] = {
+#define EXAMPLE(name, json) {SCHEMA #name, json},
+#include "protocol/examples.def"
+#undef EXAMPLE
+    };
+    for (size_t i = 0; i < sizeof examples / sizeof *examples; i++)
+        if (!strcmp(examples[i].schema, schema))
+            return examples[i].json;
+    return NULL;
+}
+
 /* One media type of a "content" object; schema NULL: bytes. */
 static void write_media(struct pen_json *json, const char *type, const char *schema)
 {
+    const char *example = schema ? example_of(schema) : NULL;
     pen_json_object(json, type);
     if (schema)
         write_ref(json, "schema", schema);
+    if (example)
+        pen_json_raw(json, "example", example);
     pen_json_end(json);
 }
 
@@ -268,11 +288,12 @@ static void write_request_queries(struct pen_json *json, const struct pen_catalo
 static void write_parameters(
     struct pen_json *json, const struct pen_route *route, const struct pen_catalogue *catalogue)
 {
-    static const char *const placeholders[][3] = {
-        {"{id}", "id", "{\"$ref\":\"" SCHEMA "IdPrefix\"}"},
-        {"{name}", "name", "{\"$ref\":\"" SCHEMA "TechniqueName\"}"},
-        {"{file}", "file", "{\"type\":\"string\"}"},
-        {"{number}", "number", "{\"type\":\"integer\",\"minimum\":0}"},
+    const char *const placeholders[][4] = {
+        {"{id}", "id", "{\"$ref\":\"" SCHEMA "IdPrefix\"}", "\"" EXAMPLE_ID "\""},
+        {"{name}", "name", "{\"$ref\":\"" SCHEMA "TechniqueName\"}", "\"pcss\""},
+        {"{file}", "file", "{\"type\":\"string\"}",
+            strstr(route->pattern, "/panels/") ? "\"picture.js\"" : "\"main.js\""},
+        {"{number}", "number", "{\"type\":\"integer\",\"minimum\":0}", "0"},
     };
     pen_json_array(json, "parameters");
     for (int i = 0; i < 4; i++) {
@@ -283,6 +304,7 @@ static void write_parameters(
         pen_json_string(json, "in", "path");
         pen_json_bool(json, "required", true);
         pen_json_raw(json, "schema", placeholders[i][2]);
+        pen_json_raw(json, "example", placeholders[i][3]);
         pen_json_end(json);
     }
     if (route->flags & PEN_ROUTE_PAGED) {

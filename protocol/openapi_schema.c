@@ -164,6 +164,8 @@ static void write_technique_object(struct pen_json *json, const struct pen_catal
 {
     char target[96];
     pen_json_object(json, "TechniqueObject");
+    pen_json_string(
+        json, "type", "object"); /* for validators that look at the discriminator alone */
     pen_json_array(json, "oneOf");
     for (uint32_t i = 0; i < catalogue->count; i++) {
         snprintf(target, sizeof target, SCHEMA "Technique-%s", catalogue->items[i]->name);

@@ -72,7 +72,7 @@ def type_of(schema, indent=""):
     for key in ("oneOf", "anyOf"):
         choices = [type_of(choice, indent) for choice in schema.get(key, [])]
         # What only says which members must be there together has no type of its own.
-        if choices and not kinds and "unknown" not in choices:
+        if choices and "properties" not in schema and "unknown" not in choices:
             return union(choices)
     return own
 

@@ -20,10 +20,9 @@ static bool answer_file(struct call *call, const char *path, struct pen_error *e
     const struct page_bytes *sent = squeezed ? &file->gzip : &file->plain;
     if (file->type == PAGE_HTML)
         http_add_header(x, "Content-Security-Policy",
-            "default-src 'self'; style-src 'self' 'unsafe-inline'; script-src 'self'%s; "
+            "default-src 'self'; style-src 'self' 'unsafe-inline'; script-src 'self'; "
             "img-src 'self' blob: data:; "
-            "form-action 'none'; frame-ancestors 'none'; base-uri 'none'",
-            *path ? " 'unsafe-inline'" : "");
+            "form-action 'none'; frame-ancestors 'none'; base-uri 'none'");
     http_add_header(x, "Cache-Control", "no-cache");
     http_add_header(x, "Vary", "Accept-Encoding");
     if (call_not_modified(call, sent->tag))

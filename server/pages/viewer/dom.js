@@ -17,7 +17,7 @@ function dress(element, props) {
  * ("onclick") and children: nodes or texts; null and false are left out. */
 export function h(tag, props = {}, ...children) {
   const element = dress(document.createElement(tag), props);
-  element.append(...children.flat().filter(child => child !== null && child !== false &&
+  element.append(...children.flat(Infinity).filter(child => child !== null && child !== false &&
     child !== undefined));
   return element;
 }
@@ -25,7 +25,7 @@ export function h(tag, props = {}, ...children) {
 /** The same in SVG, attributes only. */
 export function svg(tag, props = {}, ...children) {
   const element = dress(document.createElementNS(SVG, tag), props);
-  element.append(...children.flat().filter(child => child !== null && child !== false));
+  element.append(...children.flat(Infinity).filter(child => child !== null && child !== false));
   return element;
 }
 

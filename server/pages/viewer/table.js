@@ -1,5 +1,6 @@
 // The panels. Each module exports `mount(element, store, api)`: it fills the element, and hears of
-// changes by `store.on` and `api.on`. `element.tools` is the place for buttons beside the title.
+// changes by `store.on` and `api.on`. `element.tools` is the place for buttons beside the title. What
+// one panel alone needs lies beside it.
 //
 // region: "bar", "stage", "left", "right" or "bottom"; in "bar" and "stage" there is no title.
 // sheet: in which of the phone's sheets it stands; those in "bar" and "stage" are always there.

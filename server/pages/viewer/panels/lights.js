@@ -1,9 +1,9 @@
 // The lights: placed on the picture, with their numbers here.
 import { h } from "../dom.js";
 import { choiceField, colorField, numberField, sliderField, textField, toolButton } from "../fields.js";
-import { addGizmos } from "../gizmos.js";
+import { addGizmos } from "./gizmos.js";
 import { bindKey } from "../keys.js";
-import { Rig, SIZES, fromHex, retyped, strength, toHex } from "../rig.js";
+import { Rig, SIZES, fromHex, retyped, strength, toHex } from "./rig.js";
 
 const TYPES = Object.keys(SIZES);
 const UPLOAD = "upload";

@@ -2,7 +2,7 @@
 import { announce, h, icon, settle } from "../dom.js";
 import { toolButton } from "../fields.js";
 import { bytes, count } from "../format.js";
-import { asScenes, dropped, nameOf, send } from "../sending.js";
+import { asScenes, dropped, nameOf, send } from "./sending.js";
 
 const SAMPLES = { "Still life": "contact, and round things", "Colonnade": "long shadows of thin bars",
   "Leaves": "many layers" };
@@ -38,7 +38,7 @@ export function mount(element, store, api) {
   }
   function samples() {
     return Object.entries(SAMPLES).map(([name, about]) => h("button", { type: "button",
-      onclick: api.guard(async () => bring([(await import("../samples.js")).sample(name)])) },
+      onclick: api.guard(async () => bring([(await import("./samples.js")).sample(name)])) },
     h("b", {}, name), h("small", {}, about)));
   }
   const pick = scene => store.set({ scene, camera: null, lights: null, held: null, variant: "",

@@ -1,5 +1,5 @@
 // Files on their way to the daemon: what was dropped, how much is sent, what became of it.
-import { Penumbra } from "../penumbra.js";
+import { Penumbra } from "../../penumbra.js";
 
 /** The files of a drop, those of folders with their paths. */
 export async function dropped(transfer) {

@@ -1,7 +1,7 @@
 // Handles of the lights over the picture: dragged, or moved by the arrow keys. A light that is
 // outside of the picture has its handle on the border.
-import { announce, h, svg } from "./dom.js";
-import { Lens, add, minus, times } from "./lens.js";
+import { announce, h, svg } from "../dom.js";
+import { Lens, add, minus, times } from "../lens.js";
 import { place, round, shape, sized, toHex } from "./rig.js";
 
 const INSET = 18; // px, of handles on the border

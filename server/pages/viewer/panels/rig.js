@@ -1,7 +1,7 @@
 // The lights that are edited: what each type has, and the changes to them. Before the first change
 // they are the scene's own, or the daemon's; from then on they stand in the address, together with
 // the exposure and the sky that they were seen with, so that a light can be made darker.
-import { across, add, length, minus, times, unit } from "./lens.js";
+import { across, add, length, minus, times, unit } from "../lens.js";
 
 /** Sizes of each type, as rows of a panel. */
 export const SIZES = {

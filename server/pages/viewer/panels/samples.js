@@ -1,6 +1,6 @@
 // Three scenes that a daemon without any can begin with, made here as files in glTF 2.0: one to see
 // contact, one with long shadows of thin things, one of many layers.
-import { add, cross, unit } from "./lens.js";
+import { add, cross, unit } from "../lens.js";
 
 const STONE = [0.62, 0.56, 0.48], CLAY = [0.62, 0.25, 0.14], LEAF = [0.2, 0.42, 0.14],
   IRON = [0.16, 0.17, 0.2], SEA = [0.12, 0.3, 0.5];

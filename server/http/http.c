@@ -39,14 +39,22 @@ static bool check_target(struct http_exchange *x, struct pen_error *error)
     for (const char *scheme = "http://"; scheme; scheme = scheme[4] == ':' ? "https://" : NULL) {
         size_t n = strlen(scheme);
         if (!strncasecmp(x->path, scheme, n)) { /* the form that proxies use */
-            size_t authority = strcspn(x->path + n, "/?");
-            memmove(x->path, x->path + n + authority, strlen(x->path + n + authority) + 1);
+            static const char ends[] = {'/', FRAMING_QUERY, 0};
+            size_t bytes = strcspn(x->path + n, ends);
+            const char *rest = x->path + n + bytes;
+            if (!bytes || bytes >= sizeof x->authority || memchr(x->path + n, '@', bytes))
+                return pen_fail(error, PEN_MALFORMED, "", "The request target names no host.");
+            memcpy(x->authority, x->path + n, bytes);
+            bool is_path = *rest == '/';
+            memmove(x->path + !is_path, rest, strlen(rest) + 1);
+            *x->path = '/';
             break;
         }
     }
-    if (*x->path != '/')
+    bool is_all = !strcmp(x->path, "*") && !strcmp(x->method, "OPTIONS"); /* of the whole service */
+    if (*x->path != '/' && !is_all)
         return pen_fail(error, PEN_MALFORMED, "", "The request target is not a path.");
-    char *mark = strchr(x->path, '?');
+    char *mark = strchr(x->path, FRAMING_QUERY);
     if (mark) {
         *mark = 0;
         x->query = mark + 1;
@@ -54,9 +62,52 @@ static bool check_target(struct http_exchange *x, struct pen_error *error)
     return true;
 }
 
-const char *http_header(const struct http_exchange *x, const char *name)
+struct http_joined {
+    struct http_joined *next;
+    char *text;
+    const char *name;
+    uint32_t count;
+};
+
+static enum MHD_Result join(
+    void *context, enum MHD_ValueKind kind, const char *name, const char *value)
 {
-    return MHD_lookup_connection_value(x->connection, MHD_HEADER_KIND, name);
+    struct http_joined *joined = context;
+    (void)kind;
+    if (strcasecmp(name, joined->name) || !value)
+        return MHD_YES;
+    size_t before = joined->count++ ? strlen(joined->text) + 2 : 0, bytes = strlen(value) + 1;
+    joined->text = pen_realloc_array(joined->text, before + bytes, 1);
+    if (before)
+        memcpy(joined->text + before - 2, ", ", 2);
+    memcpy(joined->text + before, value, bytes);
+    return MHD_YES;
+}
+
+const char *http_header(struct http_exchange *x, const char *name)
+{
+    const char *first = MHD_lookup_connection_value(x->connection, MHD_HEADER_KIND, name);
+    struct http_joined all = {.name = name};
+    if (!first)
+        return NULL;
+    for (const struct http_joined *j = x->joined; j; j = j->next)
+        if (!strcasecmp(j->name, name))
+            return j->text;
+    MHD_get_connection_values(x->connection, MHD_HEADER_KIND, join, &all);
+    if (all.count < 2) {
+        free(all.text);
+        return first;
+    }
+    struct http_joined *kept = pen_alloc(1, sizeof *kept);
+    *kept = all;
+    kept->next = x->joined;
+    x->joined = kept;
+    return kept->text;
+}
+
+const char *http_host(struct http_exchange *x)
+{
+    return *x->authority ? x->authority : http_header(x, "Host");
 }
 
 /* How long the body is; what the header says of it was judged before. False: there is none. */
@@ -344,6 +395,12 @@ static void on_completed(void *context, struct MHD_Connection *connection, void 
     door_note(listener->door, x->fd, LINK_DONE);
     if (x->begun)
         __atomic_sub_fetch(&listener->active, 1, __ATOMIC_ACQ_REL);
+    while (x->joined) {
+        struct http_joined *joined = x->joined;
+        x->joined = joined->next;
+        free(joined->text);
+        free(joined);
+    }
     free(x->path);
     free(x);
 }

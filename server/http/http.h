@@ -6,6 +6,7 @@
 #include "server/wire/door.h"
 
 #define HTTP_MAX_HEADERS 16
+#define HTTP_AUTHORITY_BYTES 264
 #define HTTP_UNKNOWN_LENGTH UINT64_MAX
 
 struct http_listener;
@@ -43,9 +44,10 @@ struct http_header {
 struct http_exchange {
     struct http_listener *listener;
     const char *method;
-    char *path;      /* as sent, up to '?'; nothing decoded */
-    char *query;     /* as sent, behind '?', or NULL */
-    char client[64]; /* numeric address */
+    char *path;                           /* as sent, up to '?'; nothing decoded */
+    char *query;                          /* as sent, behind '?', or NULL */
+    char authority[HTTP_AUTHORITY_BYTES]; /* of a target that is a whole URI; or "" */
+    char client[64];                      /* numeric address */
     char request_id[REQUEST_ID_BYTES];
     uint64_t content_length;     /* 0: no body, HTTP_UNKNOWN_LENGTH: chunked */
     uint64_t header_ns, body_ns; /* when the header and the body were complete */
@@ -63,6 +65,7 @@ struct http_exchange {
     int fd;
     bool begun, answered, deferred, queued, closes, body_done;
     uint64_t received;
+    struct http_joined *joined;
 };
 
 struct http_callbacks {
@@ -100,8 +103,11 @@ void http_listener_destroy(struct http_listener *listener);
  * those that come slowly are ended. */
 void http_takes_place(const struct http_exchange *exchange);
 
-/* A header of the request, or NULL. */
-const char *http_header(const struct http_exchange *exchange, const char *name);
+/* A header of the request, or NULL; of several the values with commas (RFC 9110, 5.3). Not by two threads
+ * at a time. */
+const char *http_header(struct http_exchange *exchange, const char *name);
+/* What the client calls this service: of the target, when it says that, or Host; NULL: nothing. */
+const char *http_host(struct http_exchange *exchange);
 /* Adds a header to the answer, before http_answer. */
 void http_add_header(struct http_exchange *exchange, const char *name, const char *format, ...)
     __attribute__((format(printf, 3, 4)));

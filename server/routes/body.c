@@ -36,7 +36,7 @@ static bool says_little(const char *type, enum pen_body takes)
     return takes == PEN_BODY_IMAGE_UPLOAD && is_one_of(type, images);
 }
 
-static bool is_longer(const struct http_exchange *x, uint64_t limit)
+static bool is_longer(struct http_exchange *x, uint64_t limit)
 {
     return x->content_length != HTTP_UNKNOWN_LENGTH && x->content_length > limit;
 }
@@ -48,7 +48,7 @@ static bool too_long(struct pen_error *error)
 }
 
 /* The keys entry and name; "" when the query does not have them. */
-static bool read_keys(struct call_body *body, const struct http_exchange *x, enum pen_body takes,
+static bool read_keys(struct call_body *body, struct http_exchange *x, enum pen_body takes,
     char entry[PEN_BUNDLE_MAX_NAME + 1], struct pen_error *error)
 {
     struct pen_query_pair pairs[HTTP_MAX_PAIRS];
@@ -73,7 +73,7 @@ static bool read_keys(struct call_body *body, const struct http_exchange *x, enu
 }
 
 static bool open_upload(struct call_body *body, struct service *s, enum pen_body takes,
-    const struct http_exchange *x, const char *type, struct pen_error *error)
+    struct http_exchange *x, const char *type, struct pen_error *error)
 {
     uint64_t limit = s->config->upload_limit.bytes;
     char entry[PEN_BUNDLE_MAX_NAME + 1];
@@ -105,8 +105,7 @@ static bool open_upload(struct call_body *body, struct service *s, enum pen_body
 }
 
 /* Content-Encoding: none, or gzip. */
-static bool read_coding(
-    struct call_body *body, const struct http_exchange *x, struct pen_error *error)
+static bool read_coding(struct call_body *body, struct http_exchange *x, struct pen_error *error)
 {
     const char *coding = http_header(x, "Content-Encoding");
     if (!coding || !strcasecmp(coding, "identity"))
@@ -120,7 +119,7 @@ static bool read_coding(
 }
 
 bool body_open(struct call_body *body, struct service *service, enum pen_body takes,
-    const struct http_exchange *x, struct pen_error *error)
+    struct http_exchange *x, struct pen_error *error)
 {
     const char *type = http_header(x, "Content-Type");
     if (takes == PEN_BODY_NONE)

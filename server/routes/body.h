@@ -21,7 +21,7 @@ struct call_body {
 /* At the header, before the body is sent: refuses what the address does not take, and finds an
  * upload a place. Errors: PEN_UNKNOWN_TYPE, PEN_TOO_BIG, PEN_UNAVAILABLE. */
 bool body_open(struct call_body *body, struct service *service, enum pen_body takes,
-    const struct http_exchange *exchange, struct pen_error *error);
+    struct http_exchange *exchange, struct pen_error *error);
 /* Errors: PEN_TOO_BIG, PEN_MALFORMED, and those of upload_add. */
 bool body_add(struct call_body *body, const void *data, size_t bytes, struct pen_error *error);
 /* The last byte has come. Errors: PEN_MALFORMED. */

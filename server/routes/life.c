@@ -67,6 +67,11 @@ static enum step_end find(struct call *call, struct pen_error *error)
         call->label = call->address.route->pattern;
         return STEP_NEXT;
     }
+    if (!strcmp(x->path, "*")) { /* OPTIONS of the whole service (RFC 9110, 9.3.7) */
+        http_add_header(x, "Allow", "GET, HEAD, POST, PUT, PATCH, DELETE, OPTIONS");
+        http_answer(x, 204, NULL, http_static(NULL, 0));
+        return STEP_OVER;
+    }
     if (!call->address.methods) {
         pen_fail(error, PEN_NOT_FOUND, "", "There is nothing at this address.");
         return STEP_FAILED;
@@ -239,7 +244,7 @@ static void find_client(struct call *call)
     const struct service *s = call->service;
     const char *proxies = s->config->trusted_proxy;
     strcpy(call->prefix, s->public_prefix);
-    call->host = http_header(x, "Host");
+    call->host = http_host(x);
     call->scheme = *s->config->tls_cert ? "https" : proxy_scheme(s->config->public_url);
     if (!proxy_is_listed(proxies, x->client))
         return;

@@ -30,7 +30,7 @@ bool routes_wants_job(const struct call *call)
 static void take_print(const struct call *call, uint8_t print[PEN_ID_BYTES])
 {
     struct hash *hash = hash_create();
-    const struct http_exchange *x = call->exchange;
+    struct http_exchange *x = call->exchange;
     const char *form = routes_wants_job(call) ? "\njob\n" : "\n\n";
     hash_add(hash, x->method, strlen(x->method));
     hash_add(hash, x->path, strlen(x->path));

@@ -49,8 +49,14 @@ static bool check_field(
     return true;
 }
 
+/* Fields that say one thing: two of them would be read otherwise by another. */
+static const char *const single[] = {"Authorization", "Content-Type", "Idempotency-Key", "If-Range",
+    "Last-Event-ID", "Origin", "Range", "Sec-Fetch-Site", "X-Forwarded-Host", "X-Forwarded-Prefix",
+    "X-Forwarded-Proto"};
+
 /* What the fields say about the body and the connection. */
 struct fields {
+    uint32_t seen; /* bits: of `single` */
     uint32_t count, lengths, encodings, hosts;
     uint64_t length;
     bool close, keep;
@@ -108,6 +114,13 @@ static bool read_field(
     }
     if (is_word(line, name, "Connection"))
         read_connection(value, rest, fields);
+    for (uint32_t i = 0; i < sizeof single / sizeof *single; i++) {
+        if (!is_word(line, name, single[i]))
+            continue;
+        if (fields->seen >> i & 1)
+            return malformed(error, "A header that may be there once is there twice.");
+        fields->seen |= 1u << i;
+    }
     return true;
 }
 
@@ -219,6 +232,19 @@ int64_t framing_head(struct framing *f, const char *text, size_t bytes, struct p
             return -1;
     }
     return judge(f, &request, &fields, error) ? end : -1;
+}
+
+void framing_veil(char *head, size_t bytes)
+{
+    char *end = head + bytes, *line_end = memchr(head, '\r', bytes);
+    char *mark = memchr(head, '?', (size_t)(line_end - head));
+    if (mark)
+        *mark = FRAMING_QUERY;
+    for (char *line = line_end + 2; line < end && *line != '\r'; line = line_end + 2) {
+        line_end = memchr(line, '\r', (size_t)(end - line));
+        if (is_word(line, token_bytes(line, (size_t)(line_end - line)), "Cookie"))
+            *line = '-';
+    }
 }
 
 /* ---- chunks ---- */

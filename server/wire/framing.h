@@ -41,6 +41,11 @@ void framing_init(struct framing *framing);
  * PEN_HEADER_TOO_BIG. */
 int64_t framing_head(
     struct framing *framing, const char *text, size_t bytes, struct pen_error *error);
+/* What the library would take apart beyond the memory that it has for it, and nobody wants from it, it is
+ * not shown: the `?` of the target becomes FRAMING_QUERY, which no target has, and Cookie another name. Of
+ * a header that was judged. */
+#define FRAMING_QUERY '#'
+void framing_veil(char *head, size_t bytes);
 /* How many of the bytes belong to the request's body, until the state is FRAMING_OVER; -1: an error. What
  * of them is to be passed on is moved to the beginning of `data`, *kept bytes of it: not the extensions
  * of chunks, nor the fields behind the last one, which nobody asked for. */

@@ -270,6 +270,7 @@ static bool vet(struct link *link)
         }
         link->up.from += (uint32_t)link->framing.blank;
         link->vetted = (uint32_t)n - (uint32_t)link->framing.blank;
+        framing_veil(link->up.data + link->up.from, link->vetted);
         link->received = 0;
         enter(link, link->framing.state == FRAMING_OVER ? LINK_ANSWER : LINK_BODY);
         return true;

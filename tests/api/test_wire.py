@@ -16,6 +16,7 @@ HOST = b"Host: x\r\n"
 # What an attacker would want to have run as a request of its own.
 SMUGGLED = b"GET /v1/techniques HTTP/1.1\r\nHost: x\r\n\r\n"
 GET = b"GET /v1 HTTP/1.1\r\n"
+CLOSE = b"Connection: close\r\n"
 
 # Header bytes that are refused, and with what.
 HEADERS = {
@@ -65,6 +66,16 @@ HEADERS = {
     "header without a name": (GET + HOST + b": b\r\n\r\n", 400),
     "8 bit in a name": (GET + HOST + b"A\xe9: b\r\n\r\n", 400),
     "no Host": (GET + b"\r\n", 400),
+    "a whole URI without a host": (b"GET http:///v1 HTTP/1.1\r\n" + HOST + b"\r\n", 400),
+    "a whole URI with a password": (b"GET http://a:b@x/v1 HTTP/1.1\r\n" + HOST + b"\r\n", 400),
+    "a whole URI of something else": (b"GET ftp://x/v1 HTTP/1.1\r\n" + HOST + b"\r\n", 400),
+    "* for one address": (b"GET * HTTP/1.1\r\n" + HOST + b"\r\n", 400),
+    "two keys of a request": (GET + HOST + b"Idempotency-Key: a\r\nidempotency-key: b\r\n\r\n", 400),
+    "two tokens": (GET + HOST + b"Authorization: Bearer a\r\nAuthorization: Bearer b\r\n\r\n", 400),
+    "two types": (GET + HOST + b"Content-Type: a/b\r\nContent-Type: a/b\r\n\r\n", 400),
+    "two origins": (GET + HOST + b"Origin: http://x\r\nOrigin: http://y\r\n\r\n", 400),
+    "a target of 8,193 bytes": (b"GET /v1?" + b"a" * 8189 + b" HTTP/1.1\r\n" + HOST + b"\r\n", 414),
+    "101 headers": (GET + HOST + b"A: b\r\n" * 100 + b"\r\n", 431),
     "two Hosts": (GET + HOST + b"Host: y\r\n\r\n", 400),
     "the same Host twice": (GET + HOST + HOST + b"\r\n", 400),
     "two Hosts in one": (GET + b"Host: x y\r\n\r\n", 400),
@@ -281,6 +292,23 @@ class Wire(unittest.TestCase):
                 ("an address as Host", GET + b"Host: [::1]:80\r\n" + end, 200),
                 ("a whole URI", b"GET http://x/v1 HTTP/1.1\r\n" + HOST + end, 200),
                 ("a target of 8 kB", b"GET /v1?" + b"a" * 8000 + b" HTTP/1.1\r\n" + HOST + end, 200),
+                ("a target of 8,192 bytes", b"GET /v1?" + b"a" * 8188 + b" HTTP/1.1\r\n" + HOST + end, 200),
+                ("a thousand keys", b"GET /v1?" + b"a=1&" * 1000 + b" HTTP/1.1\r\n" + HOST + end, 200),
+                ("8,000 keys", b"GET /v1?" + b"&" * 8000 + b" HTTP/1.1\r\n" + HOST + end, 200),
+                ("a cookie of many", GET + HOST + b"Cookie: " + b"a=b;" * 6000 + b"\r\n" + end, 200),
+                ("100 headers", GET + HOST + b"A: b\r\n" * 98 + end, 200),
+                ("a whole URI without a path", b"GET http://x HTTP/1.1\r\n" + HOST + end, 200),
+                ("a whole URI with a query", b"GET http://x?a=b HTTP/1.1\r\n" + HOST + end, 200),
+                ("a whole URI for another Host", b"GET http://x/v1 HTTP/1.1\r\nHost: a.example\r\n" + end, 200),
+                ("a whole URI of another name", b"GET http://evil.example/v1 HTTP/1.1\r\n" + HOST + end, 421),
+                ("the service's options", b"OPTIONS * HTTP/1.1\r\n" + HOST + end, 204),
+                ("an upgrade", GET + HOST + b"Upgrade: h2c\r\nConnection: Upgrade, close\r\n\r\n", 200),
+                ("odd options of the connection", GET + HOST + b"Connection: , host,, transfer-encoding\r\n" +
+                 end, 200),
+                ("another expectation", self.post + b"Content-Length: %d\r\nExpect: tea\r\n" % size + end +
+                 body, 200),
+                ("an expectation in HTTP/1.0", self.post.replace(b"1.1", b"1.0") + b"Content-Length: %d\r\n"
+                 % size + b"Expect: 100-continue\r\n" + end + body, 200),
                 ("a header of 20 kB", GET + HOST + b"A: " + b"a" * 20000 + b"\r\n" + end, 200),
                 ("90 headers", GET + HOST + b"A: b\r\n" * 90 + end, 200),
                 ("no such method", b"BREW /v1 HTTP/1.1\r\n" + HOST + end, 405),
@@ -302,6 +330,34 @@ class Wire(unittest.TestCase):
                     self.assertEqual(got.count(b"HTTP/1.1 100 "), status == 100)
                     if status == 100:
                         self.assertIn(b"\r\n\r\nHTTP/1.1 200 ", got)
+
+    def test_lists_in_several_headers(self):
+        """Are one list (RFC 9110, 5.3)."""
+        with self.connect() as s:
+            got, _ = talk(s, [self.post + b"Accept: text/plain\r\nContent-Length: 2\r\nAccept: image/png\r\n"
+                              b"Connection: close\r\n\r\n{}"])
+        self.assertTrue(got.startswith(b"HTTP/1.1 200 "), got[:300])
+        # What a client says of itself stands before what the proxy adds.
+        d = Daemon("--trusted-proxy=127.0.0.1")
+        try:
+            raw(d.port, GET + HOST + b"X-Forwarded-For: 6.6.6.6\r\nX-Forwarded-For: 203.0.113.9\r\n" + CLOSE +
+                b"\r\n")
+            harness.wait(lambda: "203.0.113.9 GET /v1 " in d.log())
+            self.assertNotIn("6.6.6.6 GET", d.log())
+        finally:
+            self.assertEqual(d.stop(), 0)
+            d.kill()
+
+    def test_http_1_0(self):
+        one = b"GET /v1/techniques/none HTTP/1.0\r\n"
+        for request, answers in ((one + b"\r\n" + SMUGGLED, 1),
+                                 (one + b"Connection: keep-alive\r\n\r\n" + one + b"\r\n" + SMUGGLED, 2),
+                                 (one + b"Connection: keep-alive, close\r\n\r\n" + SMUGGLED, 1)):
+            with self.connect() as s:
+                got, closed = talk(s, [request])
+            self.assertEqual(len(re.findall(rb"HTTP/1\.[01] 200 ", got)), answers)
+            self.assertTrue(closed)
+            self.assertNotIn(b'"techniques"', got)
 
     def test_head_has_no_body(self):
         head = b"HEAD /v1/techniques HTTP/1.1\r\n" + HOST

@@ -112,6 +112,23 @@ static void test_chunks(void)
     }
 }
 
+/* What the library would take apart is hidden from it. */
+static void test_veil(void)
+{
+    struct ends ends;
+    struct link *link = make(&ends);
+    say(ends.client, "GET /a?b=?&c HTTP/1.1\r\nHost: x?y\r\nCookie: a=b\r\nCookies: c\r\n\r\n");
+    link_pump(link, 0);
+    CHECK(ends.refused == 1); /* no host's name has a question mark */
+    end(link, &ends);
+    link = make(&ends);
+    say(ends.client, "\r\nGET /a?b=?&c HTTP/1.1\r\nHost: x\r\ncookie: a=b\r\nCookies: c?\r\n\r\n");
+    link_pump(link, 0);
+    CHECK_STR(
+        hear(ends.far), "GET /a#b=?&c HTTP/1.1\r\nHost: x\r\n-ookie: a=b\r\nCookies: c?\r\n\r\n");
+    end(link, &ends);
+}
+
 /* http.c says it, and then perhaps the library. */
 static void test_continue(void)
 {
@@ -156,6 +173,7 @@ static void test_check(void)
 int main(void)
 {
     test_chunks();
+    test_veil();
     test_continue();
     test_check();
     CHECK_DONE();

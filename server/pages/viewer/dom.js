@@ -13,20 +13,23 @@ function dress(element, props) {
   return element;
 }
 
-/** An HTML element with properties (or attributes where there is no such property), listeners
- * ("onclick") and children: nodes or texts; null and false are left out. */
-export function h(tag, props = {}, ...children) {
-  const element = dress(document.createElement(tag), props);
+function fill(element, children) {
   element.append(...children.flat(Infinity).filter(child => child !== null && child !== false &&
     child !== undefined));
   return element;
 }
 
+/** An HTML element with properties (or attributes where there is no such property), listeners
+ * ("onclick") and children: nodes or texts; null and false are left out. */
+export function h(tag, props = {}, ...children) {
+  const element = dress(document.createElement(tag), props);
+  return fill(element, children);
+}
+
 /** The same in SVG, attributes only. */
 export function svg(tag, props = {}, ...children) {
   const element = dress(document.createElementNS(SVG, tag), props);
-  element.append(...children.flat(Infinity).filter(child => child !== null && child !== false));
-  return element;
+  return fill(element, children);
 }
 
 /** An icon of 16 x 16 from a path, drawn in the colour of the text. */

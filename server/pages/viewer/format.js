@@ -27,3 +27,6 @@ export const count = value => value.toLocaleString("en");
 
 /** A number without the tail that float has: 0.0005, 12.35. */
 export const short = value => String(Number(Number(value).toPrecision(5)));
+
+/** "69 k", "1.2 M". */
+export const compact = value => value.toLocaleString("en", { notation: "compact" });

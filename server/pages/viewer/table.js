@@ -7,6 +7,7 @@
 import * as animation from "./panels/animation.js";
 import * as chart from "./panels/chart.js";
 import * as code from "./panels/code.js";
+import * as compare from "./panels/compare.js";
 import * as jobs from "./panels/jobs.js";
 import * as lights from "./panels/lights.js";
 import * as method from "./panels/method.js";
@@ -20,6 +21,7 @@ import * as service from "./panels/service.js";
 export const PANELS = [
   { id: "code", region: "bar", panel: code },
   { id: "picture", region: "stage", panel: picture },
+  { id: "compare", region: "stage", panel: compare },
   { id: "animation", region: "stage", panel: animation },
   { id: "scenes", title: "Scenes", region: "left", sheet: "Scenes", panel: scenes },
   { id: "method", title: "Method", region: "right", sheet: "Method", panel: method },

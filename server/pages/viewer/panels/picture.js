@@ -5,13 +5,25 @@ import { bytes, error, time } from "../format.js";
 import { bindKey, listKey } from "../keys.js";
 import { requestOf } from "../state.js";
 
+const steps = (...colours) => "linear-gradient(to right, " + colours.map((colour, i) =>
+  colour + " " + 100 * i / colours.length + "% " + 100 * (i + 1) / colours.length + "%").join(", ") + ")";
+const GREY = "linear-gradient(to right, #000, #fff)";
+/** What the layers that are no pictures mean: colours, and what stands at both ends and between. */
+const SCALES = {
+  visibility: [GREY, "0 in the umbra", "1 lit"],
+  penumbra: [steps("#000", "#7f7f7f", "#fff"), "0 lit", "1 penumbra", "2 umbra"],
+  classes: [steps("#000", "#7f7f7f", "#fff"), "0 proved lit", "1 undecided", "2 proved umbra"],
+  error: [GREY, "0", ".05", "≥ .1 standard error"],
+};
+
 export function mount(element, store, api) {
   const view = api.view = h("penumbra-view", { id: "view", orbit: true });
   api.overlay = h("div", { class: "overlay" });
-  view.append(api.overlay);
+  const legend = h("div", { class: "legend-box layer-legend", hidden: true });
   const notice = h("p", { class: "notice", role: "alert", hidden: true });
   const facts = h("p", { class: "facts" });
-  element.append(view, notice, facts);
+  // The overlay is the view's neighbour: what lies in the element is described as one picture.
+  element.append(h("div", { class: "pictures" }, view, api.overlay, legend), notice, facts);
   let own = null; // the camera that the view reported last
 
   store.on(["scene", "technique", "params", "lights", "held", "ground", "sky", "sky_intensity", "exposure",
@@ -20,6 +32,12 @@ export function mount(element, store, api) {
     if (JSON.stringify(camera) === JSON.stringify(own)) return;
     own = camera;
     view.camera = camera;
+  });
+  store.on(["layer"], ({ layer }) => {
+    const scale = SCALES[layer];
+    legend.hidden = !scale;
+    if (scale) legend.replaceChildren(h("b", {}, layer), h("i", { style: { background: scale[0] } }),
+      h("div", {}, scale.slice(1).map(mark => h("span", {}, mark))));
   });
   api.on("token", token => { view.token = token || null; });
 

@@ -1,9 +1,8 @@
-// The viewer, and penumbra-view in a page of another origin, in Chromium.
+// penumbra-view in a page of another origin, in Chromium.
 import assert from "node:assert/strict";
 import { createServer } from "node:http";
 import { after, before, test } from "node:test";
-import { join } from "node:path";
-import { DAEMON, PICTURES, SCENE, close, count, failed, loaded, open, page, shown, until,
+import { DAEMON, SCENE, close, count, failed, loaded, open, page, shown, until,
   watched } from "./page.mjs";
 
 let server;
@@ -114,22 +113,3 @@ test("what the daemon refuses is said once", async () => {
   assert.equal(watched.asked.length, before + 1);
   assert.match(await page.locator("penumbra-view [part=status]").textContent(), /nothing_like_it/);
 });
-
-for (const [name, options] of [["desktop", { colorScheme: "light" }],
-  ["dark", { colorScheme: "dark" }],
-  ["phone", { colorScheme: "dark", viewport: { width: 390, height: 844 }, hasTouch: true }]])
-  test("the viewer, " + name, async () => {
-    await open(DAEMON + "/", options);
-    assert.equal((await loaded()).technique.name, "pcss");
-    await until(() => [...document.images].every(image =>
-      image.complete || !image.checkVisibility()));
-    assert.equal(await page.evaluate(() => document.documentElement.scrollWidth - innerWidth), 0);
-    await page.screenshot({ path: join(PICTURES, "viewer-" + name + ".png") });
-    const from = await count();
-    await page.locator("#technique").selectOption("hard");
-    assert.equal((await loaded(from)).technique.name, "hard");
-    assert.match(page.url(), /technique=hard/);
-    await page.goBack();
-    await until(() => document.querySelector("#technique").value === "pcss");
-    assert.deepEqual(watched.problems, []);
-  });

@@ -2,13 +2,15 @@
 import { createRequire } from "node:module";
 
 const { chromium } = createRequire(process.env.PACKAGES + "/")("playwright-core");
-export const { DAEMON, SCENE, SCENE_FILE, PICTURES } = process.env;
+/** Besides the daemon and what was made for the test: where it is ended (/kill) and started (/start). */
+export const { DAEMON, SCENE, SCENE_FILE, PICTURES, CONTROL } = process.env;
 const PATIENCE_MS = Number(process.env.PATIENCE_MS);
 let browser;
 
 /** The page that was opened last. */
 export let page;
-/** Of that page: errors; renders that it asked for, that are under way, and the most at once. */
+/** Of that page: errors; renders that it asked for, that are under way, and the most at once; bytes
+ * that came for each address. */
 export let watched;
 
 /** Opens a page in place of the last. */
@@ -19,11 +21,12 @@ export async function open(url, options = {}) {
   const context = await browser.newContext({ viewport: { width: 1280, height: 800 }, ...options });
   page = await context.newPage();
   page.setDefaultTimeout(PATIENCE_MS);
-  const mine = watched = { problems: [], asked: [], under: new Set(), most: 0 };
+  const mine = watched = { problems: [], asked: [], under: new Set(), most: 0,
+    bytes: new Map() };
   page.on("pageerror", reason => mine.problems.push(String(reason)));
   page.on("console", message => {
     const said = message.text() + " " + message.location().url;
-    if (message.type() === "error" && !/ERR_INTERNET_DISCONNECTED|favicon/.test(said))
+    if (message.type() === "error" && !/net::ERR_|favicon/.test(said))
       mine.problems.push(said);
   });
   page.on("request", request => {
@@ -34,6 +37,11 @@ export async function open(url, options = {}) {
   });
   for (const kind of ["requestfinished", "requestfailed"])
     page.on(kind, request => mine.under.delete(request));
+  const tools = await context.newCDPSession(page), urls = new Map();
+  await tools.send("Network.enable");
+  tools.on("Network.requestWillBeSent", ({ requestId, request }) => urls.set(requestId, request.url));
+  tools.on("Network.loadingFinished", ({ requestId, encodedDataLength }) =>
+    mine.bytes.set(urls.get(requestId), encodedDataLength));
   await page.addInitScript(() => {
     globalThis.told = [];
     for (const kind of ["load", "timing", "error", "camerachange"])

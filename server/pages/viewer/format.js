@@ -12,7 +12,7 @@ export function bytes(count) {
   const units = ["B", "KiB", "MiB", "GiB", "TiB"];
   let at = 0;
   for (; count >= 1000 && at < units.length - 1; at++) count /= 1024;
-  return (at && count < 100 ? count.toPrecision(2) : Math.round(count)) + " " + units[at];
+  return (at && count < 9.95 ? count.toFixed(1) : Math.round(count)) + " " + units[at];
 }
 
 /** An error of visibility: ".042", "0". */
@@ -27,6 +27,3 @@ export const count = value => value.toLocaleString("en");
 
 /** A number without the tail that float has: 0.0005, 12.35. */
 export const short = value => String(Number(Number(value).toPrecision(5)));
-
-/** "69 k", "1.2 M". */
-export const compact = value => value.toLocaleString("en", { notation: "compact" });

@@ -7,10 +7,10 @@ import { compareRequest } from "../measure.js";
 
 const MAPS = {
   difference: { name: "Difference", link: "difference",
-    legend: ["linear-gradient(to right, #2b4bdc, #fff, #d22)", "≤ −.25 too dark", "0 equal", "≥ +.25 too light"] },
+    legend: ["linear-gradient(to right, #00f, #fff, #f00)", "≤ −.25 too dark", "0 equal", "≥ +.25 too light"] },
   ssim: { name: "SSIM", link: "ssim_map", legend: ["linear-gradient(to right, #000, #fff)", "0 unlike", "", "1 alike"] },
   flip: { name: "FLIP", link: "flip_map",
-    legend: ["linear-gradient(to right, #000004, #6b1d81, #e45a31, #fcffa4)", "0 equal", "", "1 far"] },
+    legend: ["linear-gradient(to right, #000, #f00, #ff0, #fff)", "0 equal", "", "1 far"] },
 };
 const PIXELS = 4 << 20; // the most that a comparison takes
 
@@ -23,7 +23,7 @@ export function mount(element, store, api) {
       h("button", { type: "button", value, onclick: () => store.set({ map: value }) }, name)));
   const hint = h("span", { class: "dim" }, "hold ", h("kbd", {}, "b"), " to blink");
   const figures = h("span", { class: "dim" });
-  element.append(h("label", {}, h("span", { class: "caption" }, "Compare with"), pick), kinds, hint, figures);
+  element.append(h("label", {}, h("span", { class: "caption" }, "Compare with"), pick), kinds, hint);
 
   const b = h("penumbra-view", { class: "b", "aria-hidden": "true" });
   const map = h("img", { class: "map", alt: "", hidden: true });
@@ -31,8 +31,7 @@ export function mount(element, store, api) {
     "aria-valuemin": 0, "aria-valuemax": 100 }, h("i"));
   const names = [h("span", { class: "name-a" }), h("span", { class: "name-b" })];
   const legend = h("div", { class: "legend-box", hidden: true });
-  const layer = h("div", { class: "comparison", hidden: true }, b, map, ...names, handle, legend);
-  stage.insertBefore(layer, api.overlay.nextSibling);
+  const layer = h("div", { class: "comparison" }, b, map, ...names, handle, legend);
   let at = 0.5, mapOf = "", stop = null, url = "";
 
   function wipe(to) {
@@ -103,9 +102,10 @@ export function mount(element, store, api) {
   function show({ b: other, map: kind, technique }, changed) {
     const on = Boolean(other);
     pick.value = other ?? "";
-    layer.hidden = kinds.hidden = !on;
+    if (on && !layer.isConnected) stage.insertBefore(layer, api.overlay);
+    if (!on) layer.remove();
+    kinds.hidden = !on;
     hint.hidden = !on || kind !== "wipe";
-    figures.hidden = !on || kind === "wipe";
     for (const button of kinds.children) button.setAttribute("aria-pressed", String(button.value === kind));
     const wiped = kind === "wipe";
     b.hidden = handle.hidden = !wiped;
@@ -117,10 +117,13 @@ export function mount(element, store, api) {
     if (!wiped) {
       const { name, legend: [colours, ...marks] } = MAPS[kind];
       legend.replaceChildren(h("b", {}, name), h("i", { style: { background: colours } }),
-        h("div", {}, marks.map(mark => h("span", {}, mark))));
+        h("div", {}, marks.map(mark => h("span", {}, mark))), figures);
     }
-    if (!on) { b.scene = null; mapOf = ""; map.hidden = true; stop?.abort(); }
-    else if (changed.has("b") || changed.has("map")) follow();
+    if (!on) {
+      mapOf = "";
+      map.hidden = true;
+      stop?.abort();
+    } else if (changed.has("b") || changed.has("map")) follow();
   }
 
   api.on("techniques", techniques => {

@@ -75,6 +75,8 @@ export function mount(element, store, api) {
   });
   view.addEventListener("error", ({ detail }) => {
     if (detail.error.status === 401) api.tell("token", "");
+    if (api.there) say(detail.error.message + (detail.again ? " Trying again." :
+      api.record ? " The last good picture stays." : ""));
   });
 
   function describe({ record, blob, done }) {

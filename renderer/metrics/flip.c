@@ -3,6 +3,7 @@
 #include "renderer/metrics/colour.h"
 #include "renderer/metrics/filter.h"
 #include <math.h>
+#include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -26,10 +27,17 @@ struct flip {
     size_t pixels;
     double pixels_per_degree;
     struct metrics_colour space;
-    double *seen[2][3];    /* per picture: opponent channels, filtered; then Hunt's Lab */
-    double *feature[2][2]; /* per picture: edge and point strength */
-    double *scratch[3], *memory;
 };
+
+/* One of the two pictures, and what becomes of it. */
+struct sight {
+    const struct flip *flip;
+    const struct pen_metrics_image *image;
+    double *seen[3];    /* opponent channels, filtered; then Hunt's Lab */
+    double *feature[2]; /* edge and point strength */
+    double *scratch[3];
+};
+#define SIGHT_PLANES 8
 
 static void gaussian(struct metrics_kernel *kernel, double b, double pixels_per_degree)
 {
@@ -48,12 +56,13 @@ static double kernel_sum(const struct metrics_kernel *kernel)
 }
 
 /* Blurs one opponent channel as the eye does. */
-static void blur_channel(struct flip *f, double *channel, int number)
+static void blur_channel(struct sight *s, double *channel, int number)
 {
+    const struct flip *f = s->flip;
     double weights[2 * MAX_RADIUS + 1], total = 0;
     struct metrics_kernel kernel = {weights + MAX_RADIUS,
         (int)ceil(3 * sqrt(WIDEST / (2 * M_PI * M_PI)) * f->pixels_per_degree)};
-    double *sum = f->scratch[1], *one = f->scratch[2];
+    double *sum = s->scratch[1], *one = s->scratch[2];
     memset(sum, 0, f->pixels * sizeof *sum);
     for (int part = 0; part < 2; part++) {
         double a = contrast[number][part].a, b = contrast[number][part].b;
@@ -62,7 +71,7 @@ static void blur_channel(struct flip *f, double *channel, int number)
             continue;
         gaussian(&kernel, b, f->pixels_per_degree);
         metrics_filter(
-            channel, f->width, f->height, &kernel, &kernel, METRICS_REPEAT, f->scratch[0], one);
+            channel, f->width, f->height, &kernel, &kernel, METRICS_REPEAT, s->scratch[0], one);
         total += scale * kernel_sum(&kernel) * kernel_sum(&kernel);
         for (size_t i = 0; i < f->pixels; i++)
             sum[i] += scale * one[i];
@@ -85,8 +94,9 @@ static void balance(struct metrics_kernel *kernel)
 }
 
 /* Strength of edges (first derivatives) or points (second) of the achromatic channel in [0,1]. */
-static void detect(struct flip *f, const double *achromatic, bool points, double *strength)
+static void detect(struct sight *s, const double *achromatic, bool points, double *strength)
 {
+    const struct flip *f = s->flip;
     double across[2 * MAX_RADIUS + 1], along[2 * MAX_RADIUS + 1];
     double sigma = 0.5 * FEATURE_WIDTH * f->pixels_per_degree;
     int radius = (int)ceil(3 * sigma);
@@ -102,17 +112,20 @@ static void detect(struct flip *f, const double *achromatic, bool points, double
         smooth.weights[k] /= total;
     balance(&derivative);
     metrics_filter(achromatic, f->width, f->height, &derivative, &smooth, METRICS_REPEAT,
-        f->scratch[0], f->scratch[1]);
+        s->scratch[0], s->scratch[1]);
     metrics_filter(achromatic, f->width, f->height, &smooth, &derivative, METRICS_REPEAT,
-        f->scratch[0], f->scratch[2]);
+        s->scratch[0], s->scratch[2]);
     for (size_t i = 0; i < f->pixels; i++)
-        strength[i] = hypot(f->scratch[1][i], f->scratch[2][i]);
+        strength[i] = hypot(s->scratch[1][i], s->scratch[2][i]);
 }
 
-/* Fills seen and feature of picture `which`. */
-static void look_at(struct flip *f, const struct pen_metrics_image *image, int which)
+/* Fills seen and feature. */
+static void *look_at(void *given)
 {
-    double **seen = f->seen[which], *achromatic = f->feature[which][1];
+    struct sight *s = given;
+    const struct flip *f = s->flip;
+    const struct pen_metrics_image *image = s->image;
+    double **seen = s->seen, *achromatic = s->feature[1];
     for (size_t i = 0; i < f->pixels; i++) {
         double rgb[3], ycc[3];
         for (int c = 0; c < 3; c++)
@@ -122,10 +135,10 @@ static void look_at(struct flip *f, const struct pen_metrics_image *image, int w
             seen[c][i] = ycc[c];
         achromatic[i] = (ycc[0] + 16) / 116;
     }
-    detect(f, achromatic, false, f->feature[which][0]);
-    detect(f, achromatic, true, f->feature[which][1]); /* reads before it writes */
+    detect(s, achromatic, false, s->feature[0]);
+    detect(s, achromatic, true, s->feature[1]); /* reads before it writes */
     for (int c = 0; c < 3; c++)
-        blur_channel(f, seen[c], c);
+        blur_channel(s, seen[c], c);
     for (size_t i = 0; i < f->pixels; i++) {
         double ycc[3] = {seen[0][i], seen[1][i], seen[2][i]}, rgb[3], lab[3];
         metrics_from_opponent(&f->space, ycc, rgb);
@@ -135,6 +148,19 @@ static void look_at(struct flip *f, const struct pen_metrics_image *image, int w
         for (int c = 0; c < 3; c++)
             seen[c][i] = lab[c];
     }
+    return NULL;
+}
+
+/* Both, in a thread each where there can be another one. */
+static void look_at_both(struct sight sights[2])
+{
+    pthread_t thread;
+    bool apart = pthread_create(&thread, NULL, look_at, &sights[0]) == 0;
+    look_at(&sights[1]);
+    if (apart)
+        pthread_join(thread, NULL);
+    else
+        look_at(&sights[0]);
 }
 
 static double hyab(const double a[3], const double b[3])
@@ -174,35 +200,35 @@ bool pen_metrics_flip(const struct pen_metrics_image *test,
         .space = metrics_colour_srgb()};
     if (!(f.pixels_per_degree >= 4 && f.pixels_per_degree <= 1000)) /* the filters' radius */
         return pen_fail(error, PEN_INVALID, "", "There must be 4 to 1000 pixels per degree.");
-    double *next = f.memory = malloc(13 * f.pixels * sizeof *f.memory), sum = 0;
-    if (!f.memory)
+    double *memory = malloc(2 * SIGHT_PLANES * f.pixels * sizeof *memory), *next = memory, sum = 0;
+    if (!memory)
         return pen_fail(error, PEN_UNAVAILABLE, "", "Out of memory.");
+    struct sight sights[2] = {{.flip = &f, .image = test}, {.flip = &f, .image = reference}};
     for (int i = 0; i < 2; i++) {
         for (int c = 0; c < 3; c++, next += f.pixels)
-            f.seen[i][c] = next;
+            sights[i].seen[c] = next;
         for (int c = 0; c < 2; c++, next += f.pixels)
-            f.feature[i][c] = next;
+            sights[i].feature[c] = next;
+        for (int c = 0; c < 3; c++, next += f.pixels)
+            sights[i].scratch[c] = next;
     }
-    for (int i = 0; i < 3; i++, next += f.pixels)
-        f.scratch[i] = next;
-    look_at(&f, test, 0);
-    look_at(&f, reference, 1);
+    look_at_both(sights);
     double largest = largest_error(&f.space);
     for (size_t i = 0; i < f.pixels; i++) {
         double a[3], b[3];
         for (int c = 0; c < 3; c++) {
-            a[c] = f.seen[0][c][i];
-            b[c] = f.seen[1][c][i];
+            a[c] = sights[0].seen[c][i];
+            b[c] = sights[1].seen[c][i];
         }
         double colour = spread(pow(hyab(a, b), COLOUR_EXPONENT), largest);
-        double feature = fmax(fabs(f.feature[0][0][i] - f.feature[1][0][i]),
-            fabs(f.feature[0][1][i] - f.feature[1][1][i]));
+        double feature = fmax(fabs(sights[0].feature[0][i] - sights[1].feature[0][i]),
+            fabs(sights[0].feature[1][i] - sights[1].feature[1][i]));
         double value = pow(colour, 1 - pow(feature / M_SQRT2, FEATURE_EXPONENT));
         sum += value;
         if (map)
             map[i] = (float)value;
     }
     *mean = sum / (double)f.pixels;
-    free(f.memory);
+    free(memory);
     return true;
 }

@@ -54,7 +54,7 @@ test("a scene with animations has a time line, which poses it", async () => {
   const { time_s } = await loadedWith(({ time_s }) => time_s === 1);
   assert.equal(time_s, 1);
   assert.notEqual(await shown(), before);
-  assert.match(page.url(), /animation=turn.*time_s=1/);
+  await until(() => /animation=turn.*time_s=1/.test(location.hash)); // written when all is still
   await page.screenshot({ path: join(PICTURES, "animation-desktop.png") });
 });
 

@@ -16,7 +16,7 @@ const measured = () => until(() => /against/.test(document.querySelector("#panel
 test("the chart's figures are those of penumbra compare, its front is the best so far", async () => {
   await open(at(SMALL));
   await loaded();
-  await page.locator(".empty button").click();
+  await page.locator(".unmeasured button").click();
   await until(() => document.querySelector(".point")); // it fills in
   assert.match(await text("#panel-chart .note"), /\d+ of \d+/);
   await measured();

@@ -18,7 +18,7 @@ export function mount(element, store, api) {
   const button = h("button", { type: "button", id: "measure", onclick: () => stop ? stop.abort() : run() });
   element.tools.append(measure, button);
   const drawing = svg("svg", { class: "chart", role: "group", "aria-label": "Methods by time and error" });
-  const empty = h("div", { class: "empty" }, h("p", {}, "Which shadow is good enough here, and what does it cost?"),
+  const empty = h("div", { class: "unmeasured" }, h("p", {}, "Which shadow is good enough here, and what does it cost?"),
     h("button", { type: "button", class: "primary", onclick: () => run() }, "Measure every method on this view"));
   const note = h("p", { class: "note dim" });
   const tip = h("div", { class: "tip", hidden: true, role: "presentation" });

@@ -232,8 +232,9 @@ static bool is_queued(const struct door *door)
     return poll(&watch, 1, 0) > 0;
 }
 
-/* Accepts what is queued, or some of it: the rest has its turn after what moves already. */
-static void accept_some(struct door *door, uint32_t most)
+/* Accepts what is queued, or some of it: the rest has its turn after what moves already. False: there are
+ * no descriptors, and (may_free) none could be had: as long as events name links, none is freed. */
+static bool accept_some(struct door *door, uint32_t most, bool may_free)
 {
     bool helped = false;
     for (uint32_t i = 0; i < most; i++) {
@@ -243,7 +244,9 @@ static void accept_some(struct door *door, uint32_t most)
             door->listen_fd, (struct sockaddr *)&from, &bytes, SOCK_CLOEXEC | SOCK_NONBLOCK);
         bool starved = fd < 0 && spares_are_needed();
         if (starved && !is_queued(door))
-            return;
+            return true;
+        if (starved && !may_free)
+            return false;
         if (starved && !helped) {
             /* Those in the queue have waited long enough: somebody else makes room, or a spare. */
             helped = true;
@@ -254,14 +257,17 @@ static void accept_some(struct door *door, uint32_t most)
         }
         if (starved)
             door->deaf = true; /* trying at once would spin */
-        if (fd < 0 && !starved && (errno == EINTR || errno == ECONNABORTED))
+        if (starved)
+            return false;
+        if (fd < 0 && (errno == EINTR || errno == ECONNABORTED))
             continue;
         if (fd < 0)
-            return;
+            return true;
         int one = 1;
         setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &one, sizeof one);
         admit(door, fd, &from);
     }
+    return true;
 }
 
 static void listen_or_not(struct door *door, bool deaf)
@@ -337,10 +343,7 @@ static void serve(struct door *door, const struct epoll_event *events, int count
     }
     if (noted)
         look_at_notes(door);
-    if (knocked && door->listen_fd >= 0)
-        accept_some(door, ACCEPTED_AT_ONCE);
-    if (knocked && door->deaf)
-        listen_or_not(door, true);
+    bool starved = knocked && door->listen_fd >= 0 && !accept_some(door, ACCEPTED_AT_ONCE, false);
     uint64_t slow = 0; /* bits: of the events */
     for (int i = 0; i < count; i++) {
         struct link_ear *ear = events[i].data.ptr;
@@ -358,6 +361,10 @@ static void serve(struct door *door, const struct epoll_event *events, int count
         pump(door, ear->link, events[i].events);
         served++;
     }
+    if (starved)
+        accept_some(door, ACCEPTED_AT_ONCE, true);
+    if (door->deaf)
+        listen_or_not(door, true);
 }
 
 static void *run(void *argument)
@@ -379,7 +386,7 @@ static void *run(void *argument)
         stopping = door->stopping;
         pthread_mutex_unlock(&door->lock);
         if (close_now) {
-            accept_some(door, BACKLOG);
+            accept_some(door, BACKLOG, true);
             close(door->listen_fd);
             door->listen_fd = -1;
         }

@@ -357,6 +357,8 @@ struct service *service_create(
     s->cache = result_cache_create(config->result_cache.bytes);
     s->part_cache = result_cache_create(PART_CACHE_BYTES);
     s->scheduler = scheduler_create(&limits, on_work, s);
+    /* As many again as are served: until those that keep one for little have left it. */
+    s->places = places_create(2 * (uint32_t)config->uploads);
     s->feed = feed_create("stats", FEED_MS, routes_live_json, s);
     s->auto_runs = auto_runs_create(&(struct auto_parts){s->scheduler, s->store, catalogue});
     if (!start_importer(s, error) || !start_pool(s, error))
@@ -427,6 +429,7 @@ void service_destroy(struct service *s, const bool *hurry)
     worker_pool_destroy(s->pool);
     importer_destroy(s->importer); /* the pool's threads may still have asked for imports */
     scheduler_destroy(s->scheduler);
+    places_destroy(s->places);
     result_cache_destroy(s->cache);
     result_cache_destroy(s->part_cache);
     metrics_destroy(s->metrics);

@@ -95,10 +95,9 @@ static bool open_upload(struct call_body *body, struct service *s, enum pen_body
         return false;
     if (!read_keys(body, x, takes, entry, error))
         return false;
+    if (!places_take(s->places, body->client, error))
+        return false;
     body->has_place = true;
-    /* As many again as there are places: until those that keep one for little have left it. */
-    if (__atomic_add_fetch(&s->uploads, 1, __ATOMIC_ACQ_REL) > 2 * s->config->uploads)
-        return pen_fail(error, PEN_UNAVAILABLE, "", "Too many uploads are under way.");
     http_takes_place(x);
     body->upload = upload_create(s->store, type, entry, limit, error);
     return body->upload != NULL;
@@ -164,7 +163,7 @@ bool body_end(struct call_body *body, struct pen_error *error)
 void body_finish(struct call_body *body, struct service *service)
 {
     if (body->has_place)
-        __atomic_sub_fetch(&service->uploads, 1, __ATOMIC_ACQ_REL);
+        places_leave(service->places, body->client);
     upload_destroy(body->upload);
     gunzip_destroy(body->gunzip);
     free(body->text);

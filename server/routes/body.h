@@ -14,12 +14,14 @@ struct call_body {
     struct upload *upload;               /* until a handler takes it over */
     struct gunzip *gunzip;               /* NULL: it comes as it is */
     char name[2 * PEN_LABEL_NAME_BYTES]; /* of an upload, as its query says; "": it does not */
-    bool has_place;                      /* counts as one of service->uploads */
+    uint64_t client;                     /* whose it is */
+    bool has_place;                      /* holds one of service->places */
     bool unknown_coding;                 /* it was refused for its Content-Encoding */
 };
 
 /* At the header, before the body is sent: refuses what the address does not take, and finds an
- * upload a place. Errors: PEN_UNKNOWN_TYPE, PEN_TOO_BIG, PEN_UNAVAILABLE. */
+ * upload a place of body->client's. Errors: PEN_UNKNOWN_TYPE, PEN_TOO_BIG, PEN_TOO_MANY,
+ * PEN_UNAVAILABLE. */
 bool body_open(struct call_body *body, struct service *service, enum pen_body takes,
     struct http_exchange *exchange, struct pen_error *error);
 /* Errors: PEN_TOO_BIG, PEN_MALFORMED, and those of upload_add. */

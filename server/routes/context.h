@@ -13,6 +13,7 @@
 #include "server/live/feed.h"
 #include "server/queue/scheduler.h"
 #include "server/uploads/importer.h"
+#include "server/uploads/places.h"
 #include "server/store/scrubber.h"
 #include "server/store/result_cache.h"
 #include "server/store/scene_store.h"
@@ -45,7 +46,7 @@ struct service {
     uint8_t canary_id[PEN_ID_BYTES];
 
     bool draining;                       /* atomic */
-    uint32_t uploads;                    /* atomic: under way */
+    struct places *places;               /* of uploads under way */
     uint64_t bytes_received, bytes_sent; /* atomic, public listener */
 
     pthread_mutex_t canary_lock; /* guards the two below */

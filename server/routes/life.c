@@ -170,6 +170,7 @@ static enum step_end admit(struct call *call, struct pen_error *error)
     enum pen_body takes = (enum pen_body)call->address.route->takes;
     if (pen_upload_types(takes) && !check_part(call, error))
         return STEP_FAILED;
+    call->body.client = call->client;
     return body_open(&call->body, call->service, takes, call->exchange, error) ? STEP_NEXT
                                                                                : STEP_FAILED;
 }

@@ -55,7 +55,7 @@ class Slow(unittest.TestCase):
                 while not over.wait(0.1):
                     s.sendall(b"x" * 1800)
 
-        slow = [self.connect(d.port) for _ in range(8)]
+        slow = [self.connect(d.port, "127.0.0.%d" % (2 + i % 2)) for i in range(8)]
         threads = [threading.Thread(target=send, args=(s,)) for s in slow]
         try:
             for thread in threads[:4]:

@@ -1,7 +1,7 @@
 # The front end's parts, without HTTP and without a renderer.
 if(PENUMBRA_DAEMON)
     foreach(part file jobs scheduler fairness turns overload homes multipart cache store settings channel auto
-            framing link)
+            framing link places)
         penumbra_unit_test(server_${part} ${CMAKE_CURRENT_LIST_DIR}/server_${part}.c
             LIBS penumbra_server)
         set_tests_properties(unit.server_${part} PROPERTIES

@@ -398,21 +398,21 @@ def textures():
         yield "WebP " + name, base64.b64decode(text), "image/webp", QUADRANTS, 6
 
 
-def square(image, kind, texture=None, info=None, uv1=False, **more):
-    """A square with this picture on it; uv1: its second coordinates are the right ones."""
+def square(image, kind, texture=None, info=None, right=0, sets=2, maps=None, **more):
+    """A square with this picture on it. Of its sets of coordinates one is right. maps: of the material."""
     b = pictures.pose_files.Builder()
     corners = [[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]
     uv, wrong = [[0, 1], [1, 1], [1, 0], [0, 0]], [[0.3, 0.3]] * 4
     attributes = {"POSITION": b.floats("VEC3", corners),
-                  "TEXCOORD_0": b.floats("VEC2", wrong if uv1 else uv),
-                  "TEXCOORD_1": b.floats("VEC2", uv if uv1 else wrong)}
+                  **{"TEXCOORD_%d" % i: b.floats("VEC2", uv if i == right else wrong)
+                     for i in range(sets)}}
     b.json["meshes"] = [{"primitives": [
         {"attributes": attributes, "material": 0,
          "indices": b.accessor("SCALAR", 5123, "H", [[i] for i in (0, 1, 2, 0, 2, 3)])}]}]
     b.json["images"] = [{"bufferView": b.view(image), "mimeType": kind}]
     b.json["samplers"] = [{"magFilter": 9728, "minFilter": 9728}]
     b.json["textures"] = [{"source": 0, "sampler": 0, **(texture or {})}]
-    b.json["materials"] = [{"pbrMetallicRoughness": {
+    b.json["materials"] = [{**(maps or {}), "pbrMetallicRoughness": {
         "metallicFactor": 0, "baseColorTexture": {"index": 0, **(info or {})}}}]
     b.json.update(more)
     b.node(True, mesh=0)
@@ -481,22 +481,35 @@ class Encodings(unittest.TestCase):
         transform = ["KHR_texture_transform"]
         turned = {"rotation": math.pi / 2, "offset": [0, 1]}
         swapped = [QUADRANTS[q] for q in (2, 0, 3, 1)]  # shows its point (v, 1 - u) at (u, v)
-        for name, info, uv1, want in (
-                ("second set", {"texCoord": 1}, True, QUADRANTS),
+        for name, info, right, want in (
+                ("second set", {"texCoord": 1}, 1, QUADRANTS),
                 ("second set by the transform",
-                 {"texCoord": 0, "extensions": {"KHR_texture_transform": {"texCoord": 1}}}, True,
+                 {"texCoord": 0, "extensions": {"KHR_texture_transform": {"texCoord": 1}}}, 1,
                  QUADRANTS),
                 ("flipped", {"extensions": {"KHR_texture_transform": {
-                    "scale": [-1, 1], "offset": [1, 0]}}}, False,
+                    "scale": [-1, 1], "offset": [1, 0]}}}, 0,
                  [QUADRANTS[q] for q in (1, 0, 3, 2)]),
-                ("turned", {"extensions": {"KHR_texture_transform": turned}}, False, swapped),
+                ("turned", {"extensions": {"KHR_texture_transform": turned}}, 0, swapped),
                 ("turned, second set", {"extensions": {"KHR_texture_transform": {
-                    **turned, "texCoord": 1}}}, True, swapped),
+                    **turned, "texCoord": 1}}}, 1, swapped),
                 ("wrapped", {"extensions": {"KHR_texture_transform": {
-                    "offset": [7.5, -3.5]}}}, False, QUADRANTS[::-1])):
+                    "offset": [7.5, -3.5]}}}, 0, QUADRANTS[::-1])):
             with self.subTest(name=name):
-                self.look(square(plain, "image/png", info=info, uv1=uv1, extensionsUsed=transform),
-                          want, 1)
+                self.look(square(plain, "image/png", info=info, right=right,
+                                 extensionsUsed=transform), want, 1)
+
+    def test_many_sets_of_coordinates(self):
+        """Any two of them may be used by a material, and others by another."""
+        plain = png(pixels(lambda q: QUADRANTS[q]), 2, 8)
+        other = {"occlusionTexture": {"index": 0, "strength": 0, "texCoord": 4}}
+        for right in range(2, 8):
+            for maps in ({}, other):
+                with self.subTest(set=right, maps=maps):
+                    self.look(square(plain, "image/png", info={"texCoord": right}, right=right,
+                                     sets=8, maps=maps), QUADRANTS, 1)
+        third = {**other, "emissiveTexture": {"index": 0, "texCoord": 3}}
+        self.look(square(plain, "image/png", info={"texCoord": 2}, right=2, sets=8, maps=third),
+                  QUADRANTS, 1, True)
 
     def test_webp_beside_png(self):
         """A decoder for WebP is here: its picture is the one that is meant."""

@@ -126,7 +126,7 @@ static void five_slots(void)
     const float expected[6] = {0, 3, 0.5f, -2, 0, 0.25f};
     for (int i = 0; i < 6; i++)
         CHECK_NEAR(m->base.transform[i], expected[i], 1e-6);
-    CHECK(m->base.uv_set == 1 && m->surface.uv_set == 0 && m->occlusion.uv_set == 1);
+    CHECK(m->base.uv_set == m->occlusion.uv_set && m->base.uv_set != m->surface.uv_set);
     CHECK(m->surface.texture == m->normal.texture && m->normal.texture == m->occlusion.texture);
     CHECK_NEAR(m->normal_scale, 0.5, 0);
     CHECK_NEAR(m->occlusion_strength, 0.7, 1e-6);

@@ -41,6 +41,10 @@ struct imp_context {
     uint32_t *primitives; /* psc number of each glTF primitive, or one of the two below */
     /* psc number of each glTF material and, last, of none; UINT32_MAX: not yet. */
     uint32_t *materials;
+    struct imp_uv_sets { /* material.h */
+        bool planned, few;
+        uint32_t sets[2]; /* few: of all materials */
+    } uv_sets;
     uint32_t *textures; /* psc number of each glTF texture in each role */
     struct imp_image_slot *image_slots;
     uint32_t image_slot_count;

@@ -4,18 +4,60 @@
 #include <math.h>
 #include <string.h>
 
-static struct psc_texture_ref texture_ref(
-    struct imp_context *context, const struct gltf_texture_info *info, enum imp_role role)
+static void add_sets(const struct gltf_material *m, uint32_t *sets, uint32_t *count)
+{
+    const struct gltf_texture_info *maps[] = {
+        &m->base, &m->normal, &m->surface, &m->emission, &m->occlusion};
+    for (size_t i = 0; i < sizeof maps / sizeof *maps; i++) {
+        bool known = maps[i]->texture < 0 || maps[i]->uv_set >= GLTF_UV_SETS;
+        for (uint32_t k = 0; k < *count; k++)
+            known |= sets[k] == maps[i]->uv_set;
+        if (!known)
+            sets[(*count)++] = maps[i]->uv_set;
+    }
+}
+
+static void first_two(const uint32_t *from, uint32_t count, uint32_t sets[2])
+{
+    bool usual = (count < 1 || from[0] < 2) && (count < 2 || from[1] < 2);
+    sets[0] = usual ? 0 : from[0];
+    sets[1] = usual ? 1 : from[count > 1];
+}
+
+void imp_material_uv_sets(struct imp_context *context, int32_t material, uint32_t sets[2])
+{
+    const struct gltf_model *model = context->model;
+    struct imp_uv_sets *plan = &context->uv_sets;
+    uint32_t used[GLTF_UV_SETS], count = 0;
+    if (!plan->planned) {
+        for (uint32_t i = 0; i < model->material_count; i++)
+            add_sets(&model->materials[i], used, &count);
+        first_two(used, count, plan->sets);
+        plan->few = count <= 2;
+        plan->planned = true;
+        count = 0;
+    }
+    if (!plan->few && material >= 0 && (uint32_t)material < model->material_count)
+        add_sets(&model->materials[material], used, &count);
+    if (plan->few)
+        memcpy(sets, plan->sets, sizeof plan->sets);
+    else
+        first_two(used, count, sets);
+}
+
+/* Of a material that uses `sets`. */
+static struct psc_texture_ref texture_ref(struct imp_context *context, const uint32_t sets[2],
+    const struct gltf_texture_info *info, enum imp_role role)
 {
     struct psc_texture_ref ref = psc_material_default().base;
     if (info->texture < 0)
         return ref;
     ref.texture = imp_texture(context, info->texture, role);
-    if (info->uv_set > 1)
-        imp_warn(context, "Only the texture coordinate sets 0 and 1 are used; set %u becomes 0.",
-            info->uv_set);
-    else
-        ref.uv_set = info->uv_set;
+    ref.uv_set = sets[0] != info->uv_set && sets[1] == info->uv_set;
+    if (sets[ref.uv_set] != info->uv_set)
+        imp_warn(context,
+            "A material's textures may use two sets of texture coordinates; set %u becomes %u.",
+            info->uv_set, sets[0]);
     return ref;
 }
 
@@ -59,6 +101,8 @@ static void let_through(struct psc_material *to, const struct gltf_material *fro
 static struct psc_material convert(struct imp_context *context, const struct gltf_material *from)
 {
     struct psc_material to = psc_material_default();
+    uint32_t sets[2];
+    imp_material_uv_sets(context, (int32_t)(from - context->model->materials), sets);
     memcpy(to.base_color, from->base_color, sizeof to.base_color);
     for (int i = 0; i < 3; i++)
         to.specular[i] = clamp01(from->specular[i]);
@@ -76,12 +120,12 @@ static struct psc_material convert(struct imp_context *context, const struct glt
         imp_warn(context, "A material's unknown alphaMode is taken for OPAQUE.");
     to.flags = (from->double_sided ? PSC_DOUBLE_SIDED : 0) | (from->unlit ? PSC_UNLIT : 0) |
                (from->specular_glossiness ? PSC_SPECULAR_GLOSSINESS : 0);
-    to.base = texture_ref(context, &from->base, IMP_BASE);
-    to.surface =
-        texture_ref(context, &from->surface, from->specular_glossiness ? IMP_GLOSS : IMP_SURFACE);
-    to.normal = texture_ref(context, &from->normal, IMP_NORMAL);
-    to.occlusion = texture_ref(context, &from->occlusion, IMP_OCCLUSION);
-    to.emission = texture_ref(context, &from->emission, IMP_EMISSION);
+    to.base = texture_ref(context, sets, &from->base, IMP_BASE);
+    to.surface = texture_ref(
+        context, sets, &from->surface, from->specular_glossiness ? IMP_GLOSS : IMP_SURFACE);
+    to.normal = texture_ref(context, sets, &from->normal, IMP_NORMAL);
+    to.occlusion = texture_ref(context, sets, &from->occlusion, IMP_OCCLUSION);
+    to.emission = texture_ref(context, sets, &from->emission, IMP_EMISSION);
     let_through(&to, from);
     const struct psc_material_rest rest = imp_material_rest(from);
     pose_finish_material(&to, &rest);
@@ -103,14 +147,16 @@ uint32_t imp_material(struct imp_context *context, int32_t material)
 }
 
 bool imp_material_normal_map(
-    const struct imp_context *context, int32_t material, struct psc_texture_ref *map)
+    struct imp_context *context, int32_t material, struct psc_texture_ref *map)
 {
     if (material < 0 || (uint32_t)material >= context->model->material_count)
         return false;
     const struct gltf_texture_info *info = &context->model->materials[material].normal;
     const struct psc_map_rest rest = map_rest(info);
     *map = psc_material_default().normal;
-    map->uv_set = info->uv_set > 1 ? 0 : info->uv_set;
+    uint32_t sets[2];
+    imp_material_uv_sets(context, material, sets);
+    map->uv_set = sets[0] != info->uv_set && sets[1] == info->uv_set;
     pose_texture_transform(&rest, map->transform);
     return info->texture >= 0;
 }

@@ -192,6 +192,8 @@ static bool gather_extra(struct imp_context *context, const struct imp_geometry 
 static bool read_vertices(struct imp_context *context, struct imp_geometry *g,
     const struct gltf_primitive *primitive, uint32_t total, struct pen_error *error)
 {
+    uint32_t sets[2];
+    imp_material_uv_sets(context, primitive->material, sets);
     compact(context, g, total);
     g->used_of = total;
     if (g->vertex_count > IMP_MAX_VERTICES - context->vertex_count)
@@ -199,8 +201,8 @@ static bool read_vertices(struct imp_context *context, struct imp_geometry *g,
     context->vertex_count += g->vertex_count;
     if (!imp_gather(context, g, primitive->position, 3, 3, &g->positions, error) ||
         !gather_extra(context, g, primitive->normal, 3, 3, &g->normals, error) ||
-        !gather_extra(context, g, primitive->uv[0], 2, 2, &g->uv[0], error) ||
-        !gather_extra(context, g, primitive->uv[1], 2, 2, &g->uv[1], error) ||
+        !gather_extra(context, g, primitive->uv[sets[0]], 2, 2, &g->uv[0], error) ||
+        !gather_extra(context, g, primitive->uv[sets[1]], 2, 2, &g->uv[1], error) ||
         !gather_extra(context, g, primitive->color, 3, 4, &g->colors, error))
         return false;
     /* Without normals the specification wants flat ones, and given tangents ignored. */

@@ -8,7 +8,14 @@ void imp_variants_note(struct imp_context *context, uint32_t primitive, uint32_t
 {
     const struct gltf_primitive *from = &context->model->primitives[primitive];
     const struct gltf_mapping *mappings = context->model->mappings + from->first_mapping;
+    uint32_t sets[2], others[2];
+    imp_material_uv_sets(context, from->material, sets);
     for (uint32_t i = 0; i < from->mapping_count; i++) {
+        imp_material_uv_sets(context, mappings[i].material, others);
+        if (sets[0] != others[0] || sets[1] != others[1])
+            imp_warn(context,
+                "A variant's material uses other sets of texture coordinates than the "
+                "one it replaces; its textures may lie wrongly.");
         context->swaps = pen_grow(
             context->swaps, &context->swap_room, context->swap_count + 1, sizeof *context->swaps);
         context->swaps[context->swap_count] = (struct imp_swap){mappings[i].variant,
@@ -18,7 +25,7 @@ void imp_variants_note(struct imp_context *context, uint32_t primitive, uint32_t
 }
 
 bool imp_variants_normal_map(
-    const struct imp_context *context, uint32_t primitive, struct psc_texture_ref *map)
+    struct imp_context *context, uint32_t primitive, struct psc_texture_ref *map)
 {
     const struct gltf_primitive *from = &context->model->primitives[primitive];
     bool found = imp_material_normal_map(context, from->material, map);

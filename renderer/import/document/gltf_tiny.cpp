@@ -190,8 +190,8 @@ gltf_primitive convert(const tinygltf::Primitive &from, Owner &owner)
     to.position = attribute(from.attributes, "POSITION");
     to.normal = attribute(from.attributes, "NORMAL");
     to.tangent = attribute(from.attributes, "TANGENT");
-    to.uv[0] = attribute(from.attributes, "TEXCOORD_0");
-    to.uv[1] = attribute(from.attributes, "TEXCOORD_1");
+    for (int i = 0; i < GLTF_UV_SETS; i++)
+        to.uv[i] = attribute(from.attributes, ("TEXCOORD_" + std::to_string(i)).c_str());
     to.color = attribute(from.attributes, "COLOR_0");
     to.joints[0] = attribute(from.attributes, "JOINTS_0");
     to.joints[1] = attribute(from.attributes, "JOINTS_1");

@@ -21,11 +21,14 @@ struct gltf_accessor {
     int32_t sparse_index_view, sparse_value_view;
 };
 
+#define GLTF_UV_SETS 8
+
 struct gltf_primitive {
     uint32_t mode; /* 0 points to 6 triangle fan */
     int32_t indices, material;
     uint32_t first_mapping, mapping_count;
-    int32_t position, normal, tangent, uv[2], color; /* accessors; -1: none */
+    int32_t position, normal, tangent, color; /* accessors; -1: none */
+    int32_t uv[GLTF_UV_SETS];
     int32_t joints[2], weights[2];
     uint32_t first_target, target_count;
 };

@@ -493,8 +493,15 @@ bool frame_render(const struct frame_job *job, struct pen_frame *frame, struct p
     memset(frame, 0, sizeof *frame);
     gl_timer_reset(&job->ctx->timer);
     shadow_cache_begin_frame(job->ctx);
+    bool chosen = r->camera.mode == PEN_CAMERA_AUTO;
     if (!view_resolve(&f.view, &r->camera, job->scene, r->width, r->height, error))
         return false;
+    if (chosen && r->ground.on && f.view.eye[1] < scene_ground_top(job->scene)) {
+        r->ground.on = false;
+        pen_result_warn(result,
+            "The scene shows its surfaces to the underside alone, from where the "
+            "picture is; there is no ground in it.");
+    }
     bool scenes_own = !r->lights_given;
     f.light_count =
         lights_resolve(f.lights, r, job->scene, history_key_view(job->history, r, &f.view), result);

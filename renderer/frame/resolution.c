@@ -4,27 +4,35 @@
 /* A texel as wide as a few pixels is blurred over; steps that large are seen. */
 static const float coarse_pixels = 4;
 
-/* How far the camera looks, m: to where its axis meets the box around the content or, from inside,
- * leaves it; past it, to beside its centre. */
-static float focus_distance(const struct technique_run *run)
+/* To where the camera's axis meets a box or, from inside, leaves it, m; 0: it does not. */
+static float distance_to(const struct view *view, const float min[3], const float max[3])
 {
-    const struct view *view = run->view;
-    const float(*box)[3] = (const float(*)[3])run->scene->stage->content;
     float enter = -INFINITY, leave = INFINITY;
     for (int k = 0; k < 3; k++) {
-        float a = (box[0][k] - view->eye[k]) / view->forward[k];
-        float b = (box[1][k] - view->eye[k]) / view->forward[k];
+        float a = (min[k] - view->eye[k]) / view->forward[k];
+        float b = (max[k] - view->eye[k]) / view->forward[k];
         if (view->forward[k] == 0)
-            a = -INFINITY,
-            b = box[0][k] <= view->eye[k] && view->eye[k] <= box[1][k] ? INFINITY : a;
+            a = -INFINITY, b = min[k] <= view->eye[k] && view->eye[k] <= max[k] ? INFINITY : a;
         enter = fmaxf(enter, fminf(a, b));
         leave = fminf(leave, fmaxf(a, b));
     }
-    float beside = 0;
-    for (int k = 0; k < 3; k++)
-        beside += (0.5f * (box[0][k] + box[1][k]) - view->eye[k]) * view->forward[k];
-    float met = enter > 0 ? enter : leave;
-    return fmaxf(enter < leave && leave > 0 ? met : beside, view->near_z);
+    return enter < leave && leave > 0 ? (enter > 0 ? enter : leave) : 0;
+}
+
+/* How far the camera looks, m: to the box around the content; past it, to beside its centre; away from
+ * it, to the box around all there is. */
+static float focus_distance(const struct technique_run *run)
+{
+    const struct view *view = run->view;
+    const struct psc_header *h = run->scene->blob.header;
+    const float(*box)[3] = (const float(*)[3])run->scene->stage->content;
+    float distance = distance_to(view, box[0], box[1]);
+    if (distance <= 0)
+        for (int k = 0; k < 3; k++)
+            distance += (0.5f * (box[0][k] + box[1][k]) - view->eye[k]) * view->forward[k];
+    if (distance <= 0)
+        distance = distance_to(view, h->bounds_min, h->bounds_max);
+    return fmaxf(distance, view->near_z);
 }
 
 /* Of the map in world space, where the light's depth is z, m. */

@@ -1,4 +1,5 @@
 #include "renderer/light/light.h"
+#include "renderer/light/casters.h"
 #include <cglm/cglm.h>
 #include <string.h>
 
@@ -30,58 +31,24 @@ static void set_axes(
     memcpy(f->world_to_light, m, sizeof m);
 }
 
-/* A flat floor or wall on the far side of the bounds has everything else between itself and the
- * light: it receives, but it casts on nothing, and need not widen the map's window. */
-static bool is_backdrop(const struct scene *scene, const float min[3], const float max[3],
-    const float light[3], const float *sun_direction)
+static struct caster_light caster_light(const struct light *light)
 {
-    const struct psc_header *h = scene->blob.header;
-    float flat = 1e-4f * scene_radius(scene);
-    for (int k = 0; k < 3; k++) {
-        if (max[k] - min[k] > flat)
-            continue;
-        bool light_above = sun_direction ? sun_direction[k] < 0 : light[k] > max[k];
-        bool light_below = sun_direction ? sun_direction[k] > 0 : light[k] < min[k];
-        if ((light_above && min[k] <= h->bounds_min[k] + flat) ||
-            (light_below && max[k] >= h->bounds_max[k] - flat))
-            return true;
-    }
-    return false;
+    const struct pen_light *s = light->source;
+    bool sun = s->type == PEN_LIGHT_SUN;
+    float extent = s->type == PEN_LIGHT_RECT ? 0.5f * hypotf(s->width, s->height)
+                   : sun                     ? tanf(0.5f * glm_rad(s->angular_diameter_deg))
+                                             : s->radius;
+    return (struct caster_light){
+        light->origin, sun ? light->z : NULL, {light->x, light->y}, extent};
 }
 
 void light_find_backdrops(const struct light *light, const struct scene *scene, bool *backdrop)
 {
-    bool sun = light->source->type == PEN_LIGHT_SUN;
+    const struct caster_light as = caster_light(light);
     for (uint32_t i = 0; i < scene->blob.instance_count; i++) {
         float min[3], max[3];
         scene_instance_bounds(scene, i, min, max);
-        backdrop[i] = is_backdrop(scene, min, max, light->origin, sun ? light->z : NULL);
-    }
-}
-
-/* Bounds of everything that casts. Emitters with an extent are judged by their centre, which is
- * enough: a backdrop lies on the border of all geometry. */
-static void caster_bounds(const struct scene *scene, const struct light *light, float bounds[2][3])
-{
-    bool any = false;
-    bool sun = light->source->type == PEN_LIGHT_SUN;
-    for (uint32_t i = 0; i < scene->blob.instance_count; i++) {
-        float min[3], max[3];
-        scene_instance_bounds(scene, i, min, max);
-        if (is_backdrop(scene, min, max, light->origin, sun ? light->z : NULL))
-            continue;
-        for (int k = 0; k < 3; k++) {
-            bounds[0][k] = any ? fminf(bounds[0][k], min[k]) : min[k];
-            bounds[1][k] = any ? fmaxf(bounds[1][k], max[k]) : max[k];
-        }
-        any = true;
-    }
-    if (any)
-        return;
-    /* Nothing casts; the window only has to be valid. */
-    for (int k = 0; k < 3; k++) {
-        bounds[0][k] = scene_is_empty(scene) ? -1 : scene->blob.header->bounds_min[k];
-        bounds[1][k] = scene_is_empty(scene) ? 1 : scene->blob.header->bounds_max[k];
+        backdrop[i] = casters_is_backdrop(scene, min, max, &as);
     }
 }
 
@@ -204,12 +171,12 @@ static bool has_few_meshlets(const struct psc_scene *blob)
 static void geometry_range(const struct light_face *f, const struct light *light,
     const struct scene *scene, float range[2])
 {
-    const float *sun = light->source->type == PEN_LIGHT_SUN ? light->z : NULL;
+    const struct caster_light as = caster_light(light);
     bool alone = true; /* nothing but backdrops */
     for (uint32_t i = 0; i < scene->blob.instance_count && alone; i++) {
         float min[3], max[3];
         scene_instance_bounds(scene, i, min, max);
-        alone = is_backdrop(scene, min, max, light->origin, sun);
+        alone = casters_is_backdrop(scene, min, max, &as);
     }
     bool few = has_few_meshlets(&scene->blob);
     range[0] = INFINITY, range[1] = 0;
@@ -218,11 +185,13 @@ static void geometry_range(const struct light_face *f, const struct light *light
         const struct psc_primitive *p = &scene->blob.primitives[instance->primitive];
         float bounds[2][3], box[3][2], rows[3][4], scales[3];
         scene_instance_bounds(scene, i, bounds[0], bounds[1]);
+        if (!casters_overlap((const float(*)[3])bounds, light->within))
+            continue;
         for (int axis = 0; axis < 3; axis++) {
             box_range(f, bounds, axis, box[axis]);
             scales[axis] = light_row(f, instance, axis, rows[axis]);
         }
-        if (!alone && !f->cube && is_backdrop(scene, bounds[0], bounds[1], light->origin, sun))
+        if (!alone && !f->cube && casters_is_backdrop(scene, bounds[0], bounds[1], &as))
             narrow_backdrop(f, bounds, light->casters, box[2]);
         for (uint32_t k = 0; k < (few || !p->meshlet_count ? p->meshlet_count : 1); k++) {
             const struct psc_meshlet *m = &scene->blob.meshlets[p->first_meshlet + k];
@@ -438,8 +407,15 @@ void light_emission(struct light *light, const struct pen_light *source, const s
     make_axes(direction, source->up, light->x, light->y, light->z);
 }
 
-static void make_light(
-    struct light *light, const struct pen_light *source, const struct scene *scene)
+static void find_casters(
+    struct light *light, const struct scene *scene, const struct view *view, bool ground)
+{
+    const struct caster_light as = caster_light(light);
+    casters_bounds(scene, view, ground, &as, light->casters, light->within);
+}
+
+static void make_light(struct light *light, const struct pen_light *source,
+    const struct scene *scene, const struct view *view, bool ground)
 {
     float direction[3], center[3], radius = scene_radius(scene);
     light_emission(light, source, scene);
@@ -455,7 +431,7 @@ static void make_light(
         float distance = glm_vec3_distance(center, light->origin);
         if (distance * sinf(glm_rad(65)) < radius) {
             make_axes((float[]){0, -1, 0}, (float[]){0, 0, 1}, light->x, light->y, light->z);
-            caster_bounds(scene, light, light->casters);
+            find_casters(light, scene, view, ground);
             make_cube(light, scene);
             return;
         }
@@ -464,7 +440,7 @@ static void make_light(
     if (source->type == PEN_LIGHT_SUN)
         for (int i = 0; i < 3; i++)
             light->origin[i] = center[i] - light->z[i] * 2 * radius;
-    caster_bounds(scene, light, light->casters);
+    find_casters(light, scene, view, ground);
     light->face_count = 1;
     init_face(&light->faces[0], source);
     set_axes(&light->faces[0], light->origin, light->x, light->y, light->z);
@@ -485,7 +461,9 @@ static void auto_light(struct pen_light *light, const struct scene *scene, const
     back[1] = 0;
     glm_vec3_normalize(back);
     glm_vec3_cross((float[]){0, 1, 0}, back, right);
-    const float azimuth = glm_rad(52), elevation = glm_rad(46), distance = 6 * radius;
+    /* Who looks from under the floor looks at undersides. */
+    float side = view->eye[1] < scene_floor(scene) ? -1 : 1;
+    const float azimuth = glm_rad(52), elevation = side * glm_rad(46), distance = 6 * radius;
     float across = cosf(elevation);
     for (int i = 0; i < 3; i++) {
         float direction = across * (cosf(azimuth) * back[i] - sinf(azimuth) * right[i]) +
@@ -532,6 +510,6 @@ uint32_t lights_resolve(struct light lights[PEN_MAX_LIGHTS], struct pen_request 
         request->lights_given = 1;
     }
     for (uint32_t i = 0; i < request->light_count; i++)
-        make_light(&lights[i], &request->lights[i], scene);
+        make_light(&lights[i], &request->lights[i], scene, view, request->ground.on);
     return request->light_count;
 }

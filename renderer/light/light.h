@@ -12,7 +12,8 @@ struct light {
     const struct pen_light *source;
     struct light_face faces[6];
     uint32_t face_count;
-    float casters[2][3]; /* world bounds of what can cast a shadow in this light */
+    float within[2][3];  /* what lies outside neither casts nor receives what is seen */
+    float casters[2][3]; /* world bounds of what can cast a shadow that is seen */
     /* For shading, world space: */
     float radiance[3]; /* emitted; point, spot: intensity, W sr^-1; sun: irradiance */
     float origin[3], x[3], y[3], z[3];

@@ -23,6 +23,8 @@ static void make_matrices(struct view *v, float jitter_x, float jitter_y)
 /* Share of the picture's half that the subject may fill: the rest is air around it. */
 #define FILL 0.9f
 
+#define LEAST_NEAR 1e-3f /* of the usual near plane, or it would be at the eye */
+
 #define TURNS 48 /* azimuths that an orbit is framed for */
 
 /* The content's extremes relative to its centre: x to the right, y up, z towards the eye. */
@@ -105,7 +107,8 @@ static float shown_from(const struct scene *scene, float azimuth, float elevatio
 
 #define LEAST_SHOWN 0.3f /* of what another side shows, or that one is taken */
 
-/* Of something that is seen from one side only, the side it is seen from. */
+/* Of something that is seen from one side only, the side it is seen from; from below only where no side
+ * above shows it. */
 static void turn_to_front(struct pen_camera *c, const struct scene *scene)
 {
     float elevation = glm_rad(c->elevation_deg), usual = c->azimuth_deg, most = 0, best = usual;
@@ -115,7 +118,9 @@ static void turn_to_front(struct pen_camera *c, const struct scene *scene)
         if (there > 1.01f * most)
             most = there, best = usual + (float)turn;
     }
-    if (shown < LEAST_SHOWN * most)
+    if (fmaxf(shown, most) < LEAST_SHOWN * shown_from(scene, glm_rad(usual), -elevation))
+        c->elevation_deg = -c->elevation_deg;
+    else if (shown < LEAST_SHOWN * most)
         c->azimuth_deg = best;
 }
 
@@ -145,6 +150,17 @@ static void frame_content(struct pen_camera *c, const struct scene *scene, float
     scene_point_out(scene, target, c->target);
     scene_point_out(scene, eye, c->eye);
     c->up[0] = 0, c->up[1] = 1, c->up[2] = 0;
+}
+
+/* Depth is reversed and infinite: a small near plane costs precision only where triangles come as near.
+ * Nothing is cut off: in a wide scene a camera may look at something small. As a power of two it does not
+ * change what depths are rounded to, so a scene is the same picture in another's room. */
+static float near_plane(const struct view *v, const struct scene *scene)
+{
+    float usual = 1e-3f * scene_radius(scene), nearest = scene_nearest(scene, v->eye, 2 * usual);
+    if (!scene_is_empty(scene))
+        nearest = fminf(nearest, fabsf(v->eye[1] - scene_ground_top(scene)));
+    return exp2f(floorf(log2f(fmaxf(0.5f * nearest, LEAST_NEAR * usual))));
 }
 
 bool view_resolve(struct view *v, struct pen_camera *c, const struct scene *scene, uint32_t width,
@@ -182,9 +198,7 @@ bool view_resolve(struct view *v, struct pen_camera *c, const struct scene *scen
     glm_vec3_normalize(v->right);
     glm_vec3_cross(v->right, v->forward, v->up);
     v->fov_y_rad = glm_rad(c->fov_y_deg);
-    /* Depth is reversed and infinite: a small near plane costs no precision. As a power of two it
-     * does not change what depths are rounded to, so a scene is the same picture in another's room. */
-    v->near_z = exp2f(floorf(log2f(1e-3f * scene_radius(scene))));
+    v->near_z = near_plane(v, scene);
     make_matrices(v, 0, 0);
     return true;
 }

@@ -43,7 +43,7 @@ vec4 visibility(Surface s)
     float w = hard.z > 0.0 ? edge_within(s.pixel, radius) : 0.0;
     radius = clamp(w * hard.w, 1.5, radius);
     w = w > 0.0 ? edge_within(s.pixel, radius) : 0.0;
-    float bias = P(bias) * s.p.z * light_depth_slope(s.p.z);
+    float bias = surface_bias(s, P(bias)) * light_depth_slope(s.p.z);
     HorizonBack back = horizon_back(s.p, s.n, bias);
     // Where the light's centre sees the receiver's back there is no edge to grow from, and all that
     // may block counts.

@@ -12,7 +12,7 @@ vec4 visibility(Surface s)
 {
     vec2 q = light_project(s.p), texel = light_texel(shadow_map);
     ReceiverPlane plane = receiver_plane(s.p, s.n);
-    float bias = P(bias) * s.p.z * light_depth_slope(s.p.z), depth;
+    float bias = surface_bias(s, P(bias)) * light_depth_slope(s.p.z), depth;
     BlockerSearch search = blocker_window(s, plane, q, texel, bias);
     if (search.lit)
         discard;

@@ -12,7 +12,7 @@ vec4 visibility(Surface s)
     vec2 q = light_project(s.p), texel = light_texel(shadow_map);
     ReceiverPlane plane = receiver_plane(s.p, s.n);
     vec2 center = (floor((q - light.rect.xy) / texel) + 0.5) * texel + light.rect.xy;
-    float bias = P(bias) * s.p.z * light_depth_slope(s.p.z);
+    float bias = surface_bias(s, P(bias)) * light_depth_slope(s.p.z);
     float z = texture(shadow_map, light_uv(q)).r;
     float lit = plane_depth(plane, center - q, bias) <= z ? 1.0 : 0.0;
     Contact c = contact_of(s, plane, q, texel, REACH + 2.0);

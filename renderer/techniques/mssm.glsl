@@ -34,7 +34,7 @@ vec4 visibility(Surface s)
     vec2 q = light_project(s.p), texel = sat_texel(), least = P(min_filter) * texel;
     vec2 widest = 0.5 * sat_info.window * texel;
     ReceiverPlane plane = receiver_plane(s.p, s.n);
-    float bias = P(bias) * s.p.z / (light.far_z - light.near_z);
+    float bias = surface_bias(s, P(bias)) / (light.far_z - light.near_z);
     // The square as large as the disk.
     float shape = light.shape == SHAPE_DISK ? 0.88622693 : 1.0;
     float nearest_z;

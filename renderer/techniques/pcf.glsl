@@ -19,7 +19,7 @@ vec4 visibility(Surface s)
 {
     vec2 q = light_project(s.p), texel = light_texel(shadow_map);
     ReceiverPlane plane = receiver_plane(s.p, s.n);
-    float bias = P(bias) * s.p.z * light_depth_slope(s.p.z), sum = 0.0;
+    float bias = surface_bias(s, P(bias)) * light_depth_slope(s.p.z), sum = 0.0;
     vec2 at = vec2(0.5);
     for (int i = 0; i < int(P(taps)); i++) {
         sum += compare_bilinear(plane, (2.0 * at - 1.0) * P(radius) * texel, q, texel, bias);

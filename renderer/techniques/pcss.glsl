@@ -9,7 +9,8 @@ vec4 visibility(Surface s)
     ReceiverPlane plane = receiver_plane(s.p, s.n);
     // A tap lands anywhere in its texel, whose depth is that of its centre: half a texel along the
     // plane's slope is the most they can differ by on the receiver itself.
-    float bias = P(bias) * s.p.z * light_depth_slope(s.p.z) + 0.5 * dot(abs(plane.gradient), texel);
+    float bias =
+        surface_bias(s, P(bias)) * light_depth_slope(s.p.z) + 0.5 * dot(abs(plane.gradient), texel);
     HorizonBack back = horizon_back(s.p, s.n, bias);
     vec2 shift = P(smooth) ? frame_shift(s.pixel) : vec2(0.5);
 

@@ -148,8 +148,8 @@ vec4 visibility(Surface s)
 {
     vec2 q = light_project(s.p), texel = sat_texel(), least = P(min_filter) * texel;
     vec2 widest = 0.5 * sat_info.window * texel;
-    vec2 bias =
-        P(bias) * s.p.z * vec2(1.0 / (light.far_z - light.near_z), light_depth_slope(s.p.z));
+    vec2 bias = surface_bias(s, P(bias)) *
+                vec2(1.0 / (light.far_z - light.near_z), light_depth_slope(s.p.z));
     Receiver r =
         Receiver(q, receiver_plane(s.p, s.n), horizon_back(s.p, s.n, bias.y), bias, s.p, s.n, 0.0);
     // The square as large as the disk.

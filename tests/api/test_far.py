@@ -210,6 +210,41 @@ class Far(unittest.TestCase):
         scene = self.d.upload(mesh_scene(*stairs(), node={"scale": [1e5] * 3}))
         self.same(scene, scale=1e5)
 
+    def test_small_things_in_a_wide_scene(self):
+        """Nothing that is near the camera is cut off, however far the rest of its mesh reaches."""
+        for scale in (1, 0.1, 0.02):
+            camera = {"eye": [3 * scale, 5 * scale, 3 * scale], "target": [0, scale, 0]}
+            pictures = []
+            for half in (50 * scale, 1000, 10000):
+                points, normals, indices = stairs(scale=scale)
+                n = len(points)
+                points += [[x * half, -0.5 * scale, z * half]
+                           for x, z in ((-1, 1), (1, 1), (1, -1), (-1, -1))]
+                scene = self.d.upload(mesh_scene(points, normals + [[0, 1, 0]] * 4,
+                                                 indices + [n + i for i in (0, 1, 2, 0, 2, 3)]))
+                pictures.append(self.picture(scene, camera=camera, ground=False, technique="none",
+                                             output={"layer": "normal"}))
+            self.assertGreater(len(set(pictures[0])), 2)
+            for half, wide in zip((1000, 10000), pictures[1:]):
+                with self.subTest(scale=scale, half=half):
+                    self.assertLessEqual(off_by_more_than(pictures[0], wide, 8), 10)
+
+    def test_a_row_of_things_far_apart(self):
+        """Each with its own shadow, of maps that suit it: as if it were alone."""
+        scene = self.d.upload(mesh_scene(*stairs(), node={"translation": [0, 0, 0]}, nodes=[
+            {"mesh": 0, "translation": [400 * i, 0, 0]} for i in range(1, 5)]))
+        for x in (0, 1600):
+            for name in ("hard", "pcss", "vsm", "cssm"):
+                for kind in ("rect", "sun"):
+                    with self.subTest(x=x, method=name, light=kind):
+                        more = {"technique": {"name": name}, "output": {"layer": "visibility"},
+                                "ground": False}
+                        expected = self.picture(self.near, **view(kind=kind), **more)
+                        seen = self.picture(scene, **view((x, 0, 0), kind=kind), **more)
+                        self.assertLessEqual(off_by_more_than(expected, seen, 24), 1.5 * MOST_OFF)
+        plain = self.d.render(scene, {**SIZE, "technique": "pcss"})
+        self.assertNotIn("Texels", plain.headers.get("X-Penumbra-Warning", ""))
+
     def test_ranges(self):
         for point, status in ([1e9, 0, 0], 200), ([1.1e9, 0, 0], 422):
             answer = self.d.render(self.near, {**SIZE, "camera": {"eye": point}})

@@ -56,6 +56,13 @@ def scene(*parts):
     return b.glb()
 
 
+def sheet(rise):
+    """It faces down; one side is higher."""
+    points = [[-1, 0, -1], [1, rise, -1], [1, rise, 1], [-1, 0, 1]]
+    length = (4 + rise * rise) ** 0.5
+    return points, [[rise / length, -2 / length, 0]] * 4, [0, 1, 2, 0, 2, 3]
+
+
 class Subjects(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
@@ -86,7 +93,8 @@ class Subjects(unittest.TestCase):
                 ("lost", [thing, (box((0.5, 0.5, 0.5), (4000, 0, 0)), gray, {})]),
                 ("apart", [thing, (box((1, 1, 1), (100, 0.5, 0)), RED, {})]),
                 ("front", [(card(FRONT), RED, {})]), ("back", [(card(BACK), RED, {})]),
-                ("right", [(card(FRONT, 0), RED, {})]), ("left", [(card(BACK, 0), RED, {})])):
+                ("right", [(card(FRONT, 0), RED, {})]), ("left", [(card(BACK, 0), RED, {})]),
+                ("down", [(sheet(0), RED, {})]), ("down, tilted", [(sheet(0.3), RED, {})])):
             with self.subTest(name=name):
                 seen = [p for p in self.picture(scene(*parts)) if p[0] > 2 * max(p[1:])]
                 self.assertGreater(len(seen), 0.1 * SIZE["width"] * SIZE["height"])

@@ -43,7 +43,7 @@ vec4 visibility(Surface s)
     vec2 spread = texelFetch(spread_map, s.pixel, 0).xw;
     if (spread == vec2(1.0, 0.0)) // proved to be lit, as the target starts
         discard;
-    float depth = light_depth(s.p.z), bias = P(bias) * s.p.z * light_depth_slope(s.p.z);
+    float depth = light_depth(s.p.z), bias = surface_bias(s, P(bias)) * light_depth_slope(s.p.z);
 #ifdef SPARSE
     // The maps in order of x fall into as many strata as a pixel takes samples. Pixels of a 4 x 4
     // block divide each stratum among themselves; from stratum to stratum a pixel moves on, since

@@ -9,7 +9,7 @@ vec4 visibility(Surface s)
 {
     vec2 q = light_project(s.p), texel = light_texel(shadow_map);
     ReceiverPlane plane = receiver_plane(s.p, s.n);
-    float bias = P(bias) * s.p.z * light_depth_slope(s.p.z), depth;
+    float bias = surface_bias(s, P(bias)) * light_depth_slope(s.p.z), depth;
     vec2 least = max(P(min_filter), 0.25) * texel;
     BlockerSearch search = blocker_window(s, plane, q, least, bias);
     if (search.lit)

@@ -14,7 +14,7 @@ SampledReceiver sampled_receiver(Surface s, float bias)
     r.p = s.p;
     r.n = s.n;
     r.depth = light_depth(s.p.z);
-    r.bias = bias * s.p.z * light_depth_slope(s.p.z);
+    r.bias = surface_bias(s, bias) * light_depth_slope(s.p.z);
     r.ratio = light.near_z / s.p.z;
     r.range = light.far_z - light.near_z;
     r.np = dot(s.n, s.p);

@@ -43,7 +43,7 @@ PatchWindow patch_window(Surface s)
     vec2 texel = (light.rect.zw - light.rect.xy) / vec2(textureSize(caster_maps, 0).xy);
     ReceiverPlane plane = receiver_plane(s.p, s.n);
     w.depth = plane.depth;
-    w.bias = P(bias) * s.p.z * light_depth_slope(s.p.z);
+    w.bias = surface_bias(s, P(bias)) * light_depth_slope(s.p.z);
     vec2 least = P(min_filter) * texel;
     float nearest_z;
     w.reach = min_max_search_extent(w.q, s.p.z, least, nearest_z);

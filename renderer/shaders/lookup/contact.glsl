@@ -64,7 +64,7 @@ Contact contact_of(Surface s, ReceiverPlane plane, vec2 q, vec2 texel, float rea
     Contact c;
     c.at = (q - light.rect.xy) / texel;
     c.plane = ReceiverPlane(plane.depth, plane.gradient * texel);
-    c.rounding = 1e-6 + 4e-6 * s.p.z * light_depth_slope(s.p.z);
+    c.rounding = 1e-6 + max(4e-6 * s.p.z, surface_rounding(s)) * light_depth_slope(s.p.z);
     c.reach = reach;
     return c;
 }

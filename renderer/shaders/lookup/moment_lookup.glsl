@@ -24,7 +24,7 @@ MomentLookup moment_lookup(Surface s)
     float lod = clamp(log2(pixel / max(texel.x, texel.y)), 0.0, last);
     r.m = textureLod(moment_map, uv, lod);
     vec2 reach = (float(P(blur)) + 1.5 * exp2(ceil(lod))) * texel;
-    float bias = P(bias) * s.p.z / (light.far_z - light.near_z);
+    float bias = surface_bias(s, P(bias)) / (light.far_z - light.near_z);
     r.plane = plane_in_window(receiver_plane(s.p, s.n), vec2(0.0), reach, bias);
     r.outside = any(lessThan(uv, vec2(0.0))) || any(greaterThan(uv, vec2(1.0)));
     return r;

@@ -12,7 +12,7 @@ Receiver receiver_of(Surface s, vec2 map_size)
     Receiver r;
     r.q = light_project(s.p);
     r.plane = receiver_plane(s.p, s.n);
-    r.bias = P(bias) * s.p.z * light_depth_slope(s.p.z);
+    r.bias = surface_bias(s, P(bias)) * light_depth_slope(s.p.z);
     r.map_size = map_size;
     r.metres = (light.rect.zw - light.rect.xy) / map_size;
     return r;

@@ -23,6 +23,21 @@ Surface surface_at(ivec2 pixel, float depth)
     return s;
 }
 
+// What coordinates of that size are rounded to on their way into a map and out of a picture, m; a
+// map's depths keep the less of them, the nearer the light.
+float surface_rounding(Surface s)
+{
+    vec3 eye = abs(view.eye.xyz);
+    float size = max(max(eye.x, eye.y), eye.z) + view.forward.w / s.depth;
+    return 2.5e-7 * size * (light_parallel ? 1.0 : clamp(s.p.z / light.near_z, 1.0, 8.0));
+}
+
+// By how much it may lie behind its own depth in a map, m.
+float surface_bias(Surface s, float share)
+{
+    return share > 0.0 ? max(share * s.p.z, surface_rounding(s)) : 0.0;
+}
+
 vec3 surface_shading_normal(ivec2 pixel)
 {
     return mat3(light.world_to_light) * octahedral_decode(texelFetch(g_normal, pixel, 0).zw);

@@ -6,7 +6,7 @@
 #include "renderer/frame/job.h"
 #include "renderer/passes/draw/gbuffer.h"
 
-#define BLENDED_LAYERS 4
+#define BLENDED_LAYERS 8
 
 /* What data layers are about. */
 const struct gbuffer *frame_data_gbuffer(const struct frame_job *job);

@@ -6,8 +6,8 @@
 
 #define SIDE 64
 #define PIXELS (SIDE * SIDE)
-#define MOST 8
-#define PEELED 3 /* exactly; all that lies behind is right in the mean */
+#define MOST 12
+#define PEELED 7 /* exactly; all that lies behind is right in the mean */
 
 static const double backdrop[3] = {0.125, 0.25, 0.5};
 static const float wall[4] = {0.75f, 0.5f, 0.25f, 1};
@@ -23,7 +23,8 @@ static const float wall[4] = {0.75f, 0.5f, 0.25f, 1};
 /* Quad i of a stack, nearest first; they fill the picture. */
 static struct quad stacked(uint32_t i)
 {
-    static const float alphas[] = {0.25f, 0.6f, 0.4f, 0.5f, 0.3f, 0.7f, 0.2f, 0.45f};
+    static const float alphas[] = {
+        0.25f, 0.6f, 0.4f, 0.5f, 0.3f, 0.7f, 0.2f, 0.45f, 0.15f, 0.35f, 0.55f, 0.65f};
     struct quad q = {.center = {0, 0, -0.1f * (float)i}, .half_u = {2, 0, 0}, .half_v = {0, 2, 0}};
     for (int k = 0; k < 3; k++)
         q.color[k] = 0.25f * (float)((i + (uint32_t)k * 2) % 5);
@@ -92,7 +93,7 @@ static void check_stack(uint32_t count, const char *more, bool transparent)
     printf("%u quads%s%s: worst %.5f, bias %.5f\n", count, more, transparent ? ", transparent" : "",
         worst, bias);
     if (count <= PEELED)
-        CHECK(worst < 1e-4);
+        CHECK(worst < (count <= 4 ? 1e-4 : 5e-4)); /* a tenth of an 8-bit step */
     /* The share of light that reaches the hashed layer is at most (1 - .25) (1 - .6) (1 - .4); with
      * it the deviation of a mean over half the pixels is below .18 / 2 / 45. */
     CHECK(bias < 0.005);

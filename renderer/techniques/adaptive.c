@@ -42,10 +42,11 @@ static const struct pen_param rows[] = {
         .help = "Visibility of a cell: convolution shadow maps, as published, or comparisons."),
     PARAM(struct adaptive, theta, .def = 0.01, .min = -1, .max = 0.25,
         .help = "Least E - E^2 of a cell's visibility that splits it. 0.2244: as published; 0.25: "
-                "never; negative: always."),
+                "colour alone decides; negative: always."),
     PARAM(struct adaptive, colour, .def = 0.05, .min = 0, .max = 10,
-        .help = "Least standard deviation over mean of a cell's emission that splits it; 0: only "
-                "visibility decides."),
+        .help = "Least standard deviation over mean of a cell's emission that splits it wherever "
+                "it is partly visible, below theta, too; less than 0.04 is constant and never "
+                "split. 0: visibility alone decides."),
     PARAM(struct adaptive, blend, .def = 0.02, .min = 0, .max = 0.25,
         .help = "Range of E - E^2 above theta over which a split fades in."),
     PARAM(struct adaptive, min_filter, .def = 1, .min = 0, .max = 16, .unit = "texel",

@@ -24,8 +24,15 @@ vec4 emission_moments(vec2 center, int level)
     return textureLod(emission_texture, 0.5 * center + 0.5, coarsest - float(level));
 }
 
+// Standard deviation over mean of emission that counts as constant: half floats round to a
+// thousandth of its square, and as much again is lost in its mean over a cell.
+const float constant_emission = 0.04;
+// Variance of a visibility that is neither 0 nor 1: 1 % of the light is hidden, or seen.
+const float partly_visible = 0.0099;
+
 // 0: a cell stays whole, 1: its quarters replace it; between them over a band of variances, so that
-// no seam shows.
+// no seam shows. A cell is split where visibility varies much, or where emission does and
+// visibility is not the same everywhere; never where emission is constant (section 3.1).
 float split_weight(float visible, vec4 emission)
 {
     if (P(mode) != MODE_ADAPTIVE)
@@ -33,11 +40,14 @@ float split_weight(float visible, vec4 emission)
     if (P(theta) < 0.0)
         return 1.0;
     float mean = dot(emission.rgb, emission.rgb) / 3.0;
-    float spread = max(emission.a - mean, 0.0);
-    if (spread < P(colour) * P(colour) * mean)
+    float spread = max(emission.a - mean, 0.0), colour = P(colour), least = P(theta);
+    float constant = min(colour, constant_emission);
+    if (spread < constant * constant * mean)
         return 0.0;
+    if (colour > 0.0 && spread >= colour * colour * mean)
+        least = min(least, partly_visible);
     float variance = visible - visible * visible; // of a binary variable
-    return clamp((variance - P(theta)) / max(P(blend), 1e-6), 0.0, 1.0);
+    return clamp((variance - least) / max(P(blend), 1e-6), 0.0, 1.0);
 }
 
 vec2 quarter(int i)

@@ -10,7 +10,7 @@ layout(binding = UNIT_EDGES) uniform sampler2D edge_pyramid; // trilinear
 // The largest W of the edges within `radius` pixels, from 2 x 2 texels; 0: none.
 float edge_within(ivec2 pixel, float radius)
 {
-    int level = int(ceil(log2(2.0 * radius)));
+    int level = min(int(ceil(log2(2.0 * radius))), textureQueryLevels(edge_pyramid) - 1);
     ivec2 last = max(ivec2(view.viewport.xy) >> level, ivec2(1)) - 1, r = ivec2(ceil(radius));
     ivec2 a = clamp((pixel - r) >> level, ivec2(0), last);
     ivec2 b = clamp((pixel + r) >> level, ivec2(0), last);

@@ -103,6 +103,25 @@ static void check_far_light(void)
     }
 }
 
+/* A penumbra that is wider than the picture, whose edges' pyramid then has fewer levels than its width
+ * asks for: the size of the picture makes no difference. */
+static void check_small_pictures(const char *method)
+{
+    static const int sides[] = {48, 96, 192, 512};
+    const struct planar_case t = {.c = 1.2, .h = 3, .a = 1.5};
+    for (int i = 0; i < 4; i++) {
+        char view[200];
+        snprintf(view, sizeof view,
+            "width=%d&height=%d&ground=off&camera.eye=0,1,0&camera.target=0,0,0&camera.up=0,0,-1"
+            "&camera.fov_y_deg=90",
+            sides[i], sides[i] * 3 / 4);
+        fprintf(stderr, "%3d px ", sides[i]);
+        CHECK(deviation(
+                  PEN_GENERATED_HALF_PLANE, method, view, SMALL_LIGHT("3"), truth_half_plane, &t)
+                  .rmse < 0.05);
+    }
+}
+
 /* A penumbra of 85 px that may only reach 32 px to each side of its edge is narrower, but still a
  * ramp: nothing is cut off. */
 static void check_bounded_radius(const char *method)
@@ -316,6 +335,8 @@ int main(int argc, char **argv)
         check_closed_forms(methods[i], limits[i]);
     check_widths();
     check_far_light();
+    check_small_pictures("erosion");
+    check_small_pictures("erosion&variant=direct");
     check_bounded_radius("erosion&max_radius=32");
     check_bounded_radius("erosion&variant=direct&max_radius=32");
     check_line_fit();

@@ -121,10 +121,19 @@ def known_groups(path, info):
     return known
 
 
+# What a variant's set-up promises: maps drawn for the light at most.
+MOST_MAPS = {"bilateral": 25, "fassalss": 25, "fixed25": 25}
+
+
 def failures(groups):
-    """Variants whose method exists but which did not render: the plan or the method is broken."""
-    return ["%s, %s: %s" % (group["group"], v["name"], v.get("message", ""))
-            for group in groups.values() for v in group["variants"] if v["status"] == "failed"]
+    """Variants whose method exists but which did not render, or not what the experiment is about: the
+    plan or the method is broken."""
+    variants = [(group["group"], v) for group in groups.values() for v in group["variants"]]
+    return (["%s, %s: %s" % (group, v["name"], v.get("message", ""))
+             for group, v in variants if v["status"] == "failed"] +
+            ["%s, %s: %d maps of %d" % (group, v["name"], v["shadow_maps"], MOST_MAPS[v["name"]])
+             for group, v in variants
+             if v.get("shadow_maps", 0) > MOST_MAPS.get(v["name"], float("inf"))])
 
 
 def read_results(path):

@@ -45,7 +45,7 @@ def add(plan, scale, prefix, scene, variants, settings, pairs=(), truth=None):
 
 def chun(plan, scale):
     csm = "&map_size=1024&terms=8&taps=1&search_taps=1"
-    published = "technique=adaptive&estimator=csm&theta=0.2244&colour=0&blend=0" + csm + "&mode="
+    published = "technique=adaptive&estimator=csm&theta=0.2244&blend=0" + csm + "&mode="
     for scene in scale.scenes(plan, ("bunny-shadow", "columns@270385", "foliage@211609")):
         add(plan, scale, "chun", scene, {
             "cssm": "technique=cssm" + csm,
@@ -61,9 +61,9 @@ def cascaded(plan, scale):
         add(plan, scale, "cascaded", scene, {
             "cascaded": "technique=cascaded",
             "cascaded-paper":
-                "technique=cascaded&?split=paper&?weights=uniform&?filter=texels",
+                "technique=cascaded&split=paper&weights=uniform&filter=texels",
             "bilateral": "technique=bilateral&samples=25&map_size=1024",
-            "fassalss": "technique=adaptive-sampling&?max_samples=25&?map_size=1024",
+            "fassalss": "technique=adaptive-sampling&levels=2&map_size=1024",
             "fixed25": "technique=multisample&samples=25&map_size=1024",
             "fixed289": "technique=multisample&samples=%d&map_size=1024" % scale.samples(289),
             "pcss16": "technique=pcss&search_taps=16&filter_taps=16&map_size=1024&smooth=off",

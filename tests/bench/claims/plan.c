@@ -99,22 +99,12 @@ static void split_pairs(char *text, struct pen_query_pair *pairs, uint32_t *coun
     }
 }
 
-/* Drops the optional settings that the method does not have; NULL: there is no such method. */
-static const struct pen_technique_info *drop_optional(struct pen_query_pair *pairs, uint32_t *count)
+static bool is_known(const struct pen_query_pair *pairs, uint32_t count)
 {
-    const struct pen_technique_info *method = NULL;
-    for (uint32_t i = 0; i < *count; i++)
+    for (uint32_t i = 0; i < count; i++)
         if (!strcmp(pairs[i].key, "technique"))
-            method = pen_catalogue_find(pen_renderer_catalogue(), pairs[i].value);
-    uint32_t kept = 0;
-    for (uint32_t i = 0; method && i < *count; i++) {
-        bool optional = pairs[i].key[0] == '?';
-        if (optional && !pen_param_find(method->params, pairs[i].key + 1))
-            continue;
-        pairs[kept++] = (struct pen_query_pair){pairs[i].key + optional, pairs[i].value};
-    }
-    *count = kept;
-    return method;
+            return pen_catalogue_find(pen_renderer_catalogue(), pairs[i].value) != NULL;
+    return false;
 }
 
 static void read_variant(const struct plan_group *group, struct plan_variant *variant)
@@ -125,7 +115,7 @@ static void read_variant(const struct plan_group *group, struct plan_variant *va
     split_pairs(shared, pairs, &count);
     split_pairs(own, pairs, &count);
     variant->error = (struct pen_error){0};
-    if (!drop_optional(pairs, &count))
+    if (!is_known(pairs, count))
         variant->status = VARIANT_MISSING;
     else
         variant->status = pen_request_from_query(pairs, count, pen_renderer_catalogue(),

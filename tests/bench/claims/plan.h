@@ -8,9 +8,8 @@
  *   compare  NAME  WITH                one more comparison of two variants
  *   run                                measures the group
  *
- * SETTINGS: key=value joined by '&', as in a query string (pen_request_from_query). A key that
- * begins with '?' is left out when the method has no such parameter. FLAGS: letters, or "-":
- * f computes FLIP, k also times with kept shadow inputs, p writes pictures, v pictures of the
+ * SETTINGS: key=value joined by "&", as in a query string (pen_request_from_query); FLAGS: letters,
+ * or "-": f computes FLIP, k also times with kept shadow inputs, p writes pictures, v pictures of the
  * visibility instead of the beauty. */
 #pragma once
 #include "protocol/request.h"

@@ -194,9 +194,15 @@ static void write_comparison(struct pen_json *json, const struct pen_comparison 
         pen_json_float(json, "rmse_penumbra", (float)c->penumbra_rmse);
     else
         pen_json_null(json, "rmse_penumbra");
+    pen_json_array(json, "rmse_channels");
+    for (int i = 0; i < 3; i++)
+        pen_json_float(json, NULL, (float)c->channel_rmse[i]);
+    pen_json_end(json);
     pen_json_float(json, "mean_error", (float)c->mean_error);
     pen_json_float(json, "largest_error", (float)c->largest);
+    pen_json_float(json, "rmse_picture", (float)c->picture_rmse);
     pen_json_float(json, "ssim", (float)c->ssim);
+    pen_json_float(json, "ssim_contrast", (float)c->ssim_contrast);
     pen_json_float(json, "flip", (float)c->flip);
     pen_json_uint(json, "penumbra_pixels", c->penumbra_pixels);
 }

@@ -39,8 +39,10 @@ struct pen_program_counts {
 /* How far a picture is from its reference; see renderer/metrics/metrics.h. */
 struct pen_comparison {
     double rmse, penumbra_rmse, mean_error, largest; /* of the mean visibility */
-    double ssim, flip;                               /* of the display picture */
-    uint64_t penumbra_pixels;                        /* 0.02 < reference < 0.98 */
+    double channel_rmse[3];                          /* of the coloured visibility: r, g, b */
+    /* Of the display picture; contrast: SSIM's second factor. */
+    double picture_rmse, ssim, ssim_contrast, flip;
+    uint64_t penumbra_pixels; /* 0.02 < reference < 0.98 */
 };
 
 /* Where a render is, for logs. */

@@ -29,10 +29,15 @@ bool pen_metrics_visibility(const struct pen_metrics_image *test,
 /* Structural similarity (Wang et al. 2004) of the luma 0.299 r + 0.587 g + 0.114 b of
  * display-encoded RGB in [0,1]: Gaussian window 11 x 11, sigma 1.5, K1 0.01, K2 0.03, range 1.
  * `map`, when not NULL: width * height values in [-1,1]. At a pixel whose window leaves the picture
- * the window is cut and its weights scaled to sum to 1. Such pixels do not enter *mean, unless no
- * window fits at all (a side below 11); so *mean is what the authors' own program gives. */
+ * the window is cut and its weights scaled to sum to 1. Such pixels do not enter the means, unless no
+ * window fits at all (a side below 11); so the mean is what the authors' own program gives. */
+struct pen_metrics_similarity {
+    double mean;     /* 1: equal */
+    double contrast; /* the mean of SSIM's second factor, of the standard deviations alone */
+};
 bool pen_metrics_ssim(const struct pen_metrics_image *test,
-    const struct pen_metrics_image *reference, float *map, double *mean, struct pen_error *error);
+    const struct pen_metrics_image *reference, float *map, struct pen_metrics_similarity *out,
+    struct pen_error *error);
 
 /* What a viewer sees when flipping between the two pictures: LDR-FLIP (Andersson et al. 2020) of
  * display-encoded sRGB (clamped to [0,1]), 0 equal to 1. `pixels_per_degree`: of the viewer's eye;

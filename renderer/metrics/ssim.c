@@ -15,10 +15,11 @@ static double luma(const struct pen_metrics_image *image, size_t pixel)
 }
 
 bool pen_metrics_ssim(const struct pen_metrics_image *test,
-    const struct pen_metrics_image *reference, float *map, double *mean, struct pen_error *error)
+    const struct pen_metrics_image *reference, float *map, struct pen_metrics_similarity *out,
+    struct pen_error *error)
 {
     enum { A, B, AA, BB, AB, SCRATCH, PLANES };
-    double weights[2 * RADIUS + 1], total = 0, sum = 0;
+    double weights[2 * RADIUS + 1], total = 0, sum = 0, contrasts = 0;
     struct metrics_kernel kernel = {weights + RADIUS, RADIUS};
     if (!metrics_check(test, reference, 3, error))
         return false;
@@ -58,9 +59,11 @@ bool pen_metrics_ssim(const struct pen_metrics_image *test,
             if (fits && (x < RADIUS || y < RADIUS || x + RADIUS >= width || y + RADIUS >= height))
                 continue;
             sum += value;
+            double deviations = sqrt(fmax(aa, 0) * fmax(bb, 0));
+            contrasts += (2 * deviations + C2) / (aa + bb + C2);
             counted++;
         }
-    *mean = sum / (double)counted;
+    *out = (struct pen_metrics_similarity){sum / (double)counted, contrasts / (double)counted};
     free(planes);
     return true;
 }

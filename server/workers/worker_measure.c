@@ -10,15 +10,17 @@
 #include <sys/stat.h>
 
 #define DIFFERENCE_FULL 0.25f /* of visibility: where the difference map has its full colour */
-#define PLANES_MAGIC 0x31504e50u
+#define PLANES_MAGIC 0x32504e50u
+#define PLANES_FLOATS 7 /* per pixel */
 
-/* What crosses as the reference: this, then `pixels` mean visibilities, then RGB display values. */
+/* What crosses as the reference: this, then `pixels` mean visibilities, then RGB display values, then
+ * coloured visibilities. */
 struct planes_header {
     uint32_t magic, width, height, reserved;
 };
 struct planes {
     uint32_t width, height;
-    const float *visibility, *display; /* 1 and 3 floats per pixel */
+    const float *visibility, *display, *colours; /* 1, 3 and 3 floats per pixel */
 };
 
 void worker_measure_output(struct pen_output *output)
@@ -69,14 +71,15 @@ static struct planes_header *make_planes(
     size_t pixels = (size_t)frame->width * frame->height;
     const float *beauty = find_plane(frame, pen_layer_names[PEN_LAYER_BEAUTY]);
     const float *visibility = find_plane(frame, pen_layer_names[PEN_LAYER_VISIBILITY]);
-    *bytes = sizeof(struct planes_header) + pixels * 4 * sizeof(float);
+    *bytes = sizeof(struct planes_header) + pixels * PLANES_FLOATS * sizeof(float);
     struct planes_header *header = beauty && visibility ? malloc(*bytes) : NULL;
     if (!header)
         return NULL;
     *header = (struct planes_header){PLANES_MAGIC, frame->width, frame->height, 0};
-    float *to = (float *)(header + 1), *display = to + pixels;
+    float *to = (float *)(header + 1), *display = to + pixels, *colours = display + 3 * pixels;
     for (size_t i = 0; i < pixels; i++) {
         to[i] = visibility[4 * i + 3];
+        memcpy(&colours[3 * i], &visibility[4 * i], 3 * sizeof *colours);
         to_display(&beauty[4 * i], request->tone_map, &display[3 * i]);
     }
     return header;
@@ -85,8 +88,9 @@ static struct planes_header *make_planes(
 static struct planes read_planes(const struct planes_header *header)
 {
     const float *values = (const float *)(header + 1);
+    size_t pixels = (size_t)header->width * header->height;
     return (struct planes){
-        header->width, header->height, values, values + (size_t)header->width * header->height};
+        header->width, header->height, values, values + pixels, values + 4 * pixels};
 }
 
 /* ---- pictures ---- */
@@ -168,12 +172,22 @@ static bool compare(const struct planes *test, const struct planes *reference, f
         .penumbra_pixels = visibility.penumbra_pixels};
     if (!maps)
         return true;
+    for (int i = 0; i < 3; i++) {
+        a = (struct pen_metrics_image){test->colours + i, test->width, test->height, 3};
+        b = (struct pen_metrics_image){reference->colours + i, test->width, test->height, 3};
+        if (!pen_metrics_rmse(&a, &b, 1, &out->channel_rmse[i], error))
+            return false;
+    }
     for (size_t i = 0; i < (size_t)test->width * test->height; i++)
         maps[MEASURE_MAP_DIFFERENCE][i] = test->visibility[i] - reference->visibility[i];
     a = (struct pen_metrics_image){test->display, test->width, test->height, 3};
     b = (struct pen_metrics_image){reference->display, reference->width, reference->height, 3};
-    return pen_metrics_ssim(&a, &b, maps[MEASURE_MAP_SSIM], &out->ssim, error) &&
-           pen_metrics_flip(&a, &b, 0, maps[MEASURE_MAP_FLIP], &out->flip, error);
+    struct pen_metrics_similarity similarity = {0};
+    bool ok = pen_metrics_rmse(&a, &b, 3, &out->picture_rmse, error) &&
+              pen_metrics_ssim(&a, &b, maps[MEASURE_MAP_SSIM], &similarity, error);
+    out->ssim = similarity.mean;
+    out->ssim_contrast = similarity.contrast;
+    return ok && pen_metrics_flip(&a, &b, 0, maps[MEASURE_MAP_FLIP], &out->flip, error);
 }
 
 static bool compare_and_paint(const struct worker_item *item, const struct planes *test,

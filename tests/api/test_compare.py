@@ -56,6 +56,19 @@ class Compare(unittest.TestCase):
         self.assertEqual(answer.headers["Content-Type"], "image/png")
         return read_png(answer.body)[2]
 
+    def test_colours(self):
+        """One mean visibility times the light's mean colour is wrong in every channel, and right in
+        the mean: only the coloured figures tell it from cells that take their own colours."""
+        light = {"type": "rect", "width": 1.5, "height": 1.5,
+                 "texture": {"pattern": "two-colour"}}
+        modes = [{"name": "adaptive", "params": {"mode": mode}} for mode in ("average", "fixed2")]
+        mean, cells = self.compare({**VIEW, "lights": [light], "techniques": modes,
+                                    "reference": REFERENCE})["methods"]
+        self.assertLess(abs(mean["rmse"] - cells["rmse"]), 0.5 * max(mean["rmse"], cells["rmse"]))
+        for mean_error, cell_error in zip(mean["rmse_channels"][:2], cells["rmse_channels"][:2]):
+            self.assertGreater(mean_error, 1.5 * cell_error)
+        self.assertGreater(mean["rmse_picture"], cells["rmse_picture"])
+
     def test_figures(self):
         methods = ["hard", "pcss", REFERENCE, {"name": "multisample", "params": {"samples": 4}}]
         answer = self.compare({**VIEW, "techniques": methods, "reference": REFERENCE})
@@ -65,7 +78,9 @@ class Compare(unittest.TestCase):
         self.assertEqual(answer["reference"]["technique"]["params"]["samples"], 128)
         # The reference against itself.
         self.assertEqual((same["rmse"], same["flip"], same["mean_error"]), (0, 0, 0))
+        self.assertEqual((same["rmse_channels"], same["rmse_picture"]), ([0, 0, 0], 0))
         self.assertAlmostEqual(same["ssim"], 1, places=6)
+        self.assertAlmostEqual(same["ssim_contrast"], 1, places=6)
         # More samples are nearer, and soft is nearer than hard.
         self.assertLess(pcss["rmse"], 0.5 * hard["rmse"])
         self.assertLess(few["rmse_penumbra"], hard["rmse_penumbra"])
@@ -73,6 +88,11 @@ class Compare(unittest.TestCase):
             self.assertGreater(m["rmse_penumbra"], m["rmse"])
             self.assertGreater(m["penumbra_pixels"], 50)
             self.assertLess(m["ssim"], 1)
+            self.assertGreaterEqual(m["ssim_contrast"], m["ssim"])
+            # One white light: all channels are the mean visibility.
+            for channel in m["rmse_channels"]:
+                self.assertAlmostEqual(channel, m["rmse"], delta=2e-3 * m["rmse"] + 1e-6)
+            self.assertGreater(m["rmse_picture"], 0)
             self.assertGreater(m["flip"], 0)
             self.assertGreater(m["shadow_ms"], 0)
             self.assertGreaterEqual(m["total_ms"], m["shadow_ms"])

@@ -35,9 +35,9 @@ static void fill_noise(float (*pixels)[4], uint32_t seed)
 static double ssim(float (*a)[4], float (*b)[4], float *map)
 {
     struct pen_metrics_image x = image_of(a), y = image_of(b);
-    double mean = NAN;
-    CHECK(pen_metrics_ssim(&x, &y, map, &mean, NULL));
-    return mean;
+    struct pen_metrics_similarity s = {NAN, NAN};
+    CHECK(pen_metrics_ssim(&x, &y, map, &s, NULL));
+    return s.mean;
 }
 
 static double flip(float (*a)[4], float (*b)[4])
@@ -124,10 +124,11 @@ static void test_ssim(void)
     fill_noise(noise, 4);
     fill_noise(other, 5);
     struct pen_metrics_image x = {noise[0], 7, 9, 4}, y = {other[0], 7, 9, 4};
-    CHECK(pen_metrics_ssim(&x, &y, map, &mean, NULL));
+    struct pen_metrics_similarity s;
+    CHECK(pen_metrics_ssim(&x, &y, map, &s, NULL));
     for (int i = (int)(sum = 0); i < 63; i++)
         sum += (double)map[i];
-    CHECK_NEAR(mean, sum / 63, 1e-6);
+    CHECK_NEAR(s.mean, sum / 63, 1e-6);
 }
 
 static void test_flip(void)
@@ -187,10 +188,11 @@ static void test_refusals(void)
 {
     struct pen_metrics_image a = image_of(noise), b = a;
     double value;
+    struct pen_metrics_similarity similarity;
     struct pen_error error = {0};
     b.width--;
     CHECK(!pen_metrics_rmse(&a, &b, 3, &value, &error) && error.code == PEN_INVALID);
-    CHECK(!pen_metrics_ssim(&a, &b, NULL, &value, NULL));
+    CHECK(!pen_metrics_ssim(&a, &b, NULL, &similarity, NULL));
     CHECK(!pen_metrics_flip(&a, &b, 0, NULL, &value, NULL));
     b = a;
     b.stride = 2;

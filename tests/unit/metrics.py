@@ -11,7 +11,7 @@ def rmse(a, b):
 
 def ssim(a, b, width, height):
     ya, yb = ([0.299 * p[0] + 0.587 * p[1] + 0.114 * p[2] for p in image] for image in (a, b))
-    values, whole = [], []
+    values, contrasts, whole = [], [], []
     for y in range(height):
         for x in range(width):
             weights, at = [], []
@@ -27,10 +27,12 @@ def ssim(a, b, width, height):
             cov = sum(w * (ya[k] - ma) * (yb[k] - mb) for w, k in zip(weights, at)) / total
             values.append((2 * ma * mb + 1e-4) * (2 * cov + 9e-4)
                           / ((ma * ma + mb * mb + 1e-4) * (va + vb + 9e-4)))
+            contrasts.append((2 * math.sqrt(va * vb) + 9e-4) / (va + vb + 9e-4))
             if len(at) == 121:
-                whole.append(values[-1])
-    kept = whole or values
-    return sum(kept) / len(kept), values
+                whole.append(len(values) - 1)
+    kept = whole or range(len(values))
+    return (sum(values[i] for i in kept) / len(kept), values,
+            sum(contrasts[i] for i in kept) / len(kept))
 
 
 # IEC 61966-2-1 gives this matrix to four digits; here from the primaries, by Cramer's rule.
@@ -187,10 +189,10 @@ def main():
         lines = subprocess.run([sys.argv[1], str(ppd)], input=text, text=True, check=True,
                                capture_output=True, timeout=60).stdout.splitlines()
         got = [[float(v) for v in line.split()] for line in lines]
-        wanted = [[rmse(a, b)]]
-        for mean, values in (ssim(a, b, width, height), flip(a, b, width, height, ppd)):
-            wanted.append([mean] + values)
-        for name, g, w in zip(("RMSE", "SSIM", "FLIP"), got, wanted):
+        similarity, similarities, contrast = ssim(a, b, width, height)
+        difference, differences = flip(a, b, width, height, ppd)
+        wanted = [[rmse(a, b)], [similarity] + similarities, [contrast], [difference] + differences]
+        for name, g, w in zip(("RMSE", "SSIM", "contrast", "FLIP"), got, wanted):
             worst = max(abs(x - y) for x, y in zip(g, w))
             print("%d x %d %s: %.6f, largest difference %.1e" % (width, height, name, w[0], worst))
             if len(g) != len(w) or not worst < 2e-6:

@@ -28,9 +28,11 @@ int main(int argc, char **argv)
     if (!pen_metrics_rmse(&test, &reference, 3, &mean, NULL))
         return 1;
     print_line(mean, NULL, 0);
-    if (!pen_metrics_ssim(&test, &reference, map, &mean, NULL))
+    struct pen_metrics_similarity similarity;
+    if (!pen_metrics_ssim(&test, &reference, map, &similarity, NULL))
         return 1;
-    print_line(mean, map, count);
+    print_line(similarity.mean, map, count);
+    print_line(similarity.contrast, NULL, 0);
     if (!pen_metrics_flip(&test, &reference, pixels_per_degree, map, &mean, NULL))
         return 1;
     print_line(mean, map, count);

@@ -70,8 +70,11 @@ void compare_write(struct pen_json *json, const struct plan_group *group,
     double value;
     if (pen_metrics_rmse(&a, &b, 3, &value, &error))
         pen_json_double(json, "image_rmse", value);
-    if (pen_metrics_ssim(&a, &b, NULL, &value, &error))
-        pen_json_double(json, "ssim", value);
+    struct pen_metrics_similarity similarity;
+    if (pen_metrics_ssim(&a, &b, NULL, &similarity, &error)) {
+        pen_json_double(json, "ssim", similarity.mean);
+        pen_json_double(json, "ssim_contrast", similarity.contrast);
+    }
     if (flip && pen_metrics_flip(&a, &b, 0, NULL, &value, &error))
         pen_json_double(json, "flip", value);
     free(shown);

@@ -104,10 +104,16 @@ test("errors carry the problem document", async () => {
 });
 
 test("a comparison", async () => {
-  const { methods } = await daemon.compare(id, { width: 48, height: 36, techniques: ["hard"],
-    deadline_ms: 300000, reference: { name: "multisample", params: { samples: 16 } } });
+  const request = { width: 48, height: 36, techniques: ["hard"], deadline_ms: 300000,
+    reference: { name: "multisample", params: { samples: 16 } } };
+  const { methods } = await daemon.compare(id, request);
   assert.equal(methods[0].technique.name, "hard");
   assert.equal(typeof methods[0].rmse, "number");
+  const told = [];
+  for await (const { event, data } of daemon.measure(id, request)) told.push([event, data]);
+  assert.deepEqual(told.map(([event]) => event), ["reference", "method", "done"]);
+  assert.equal(told[1][1].rmse, methods[0].rmse);
+  assert.deepEqual(told[2][1].methods, [told[1][1]]);
 });
 
 test("a job tells its frames and gives them", async () => {

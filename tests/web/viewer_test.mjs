@@ -97,6 +97,59 @@ test("keys choose methods, frame, compare and tell of themselves", async () => {
   await until(() => /b=raytraced/.test(location.hash));
 });
 
+test("100 fast changes of method leave no request behind, and end with the right picture", async () => {
+  await open(at(SMALL));
+  await loaded();
+  const names = await page.locator("#technique option").evaluateAll(options => options.map(o => o.value));
+  const from = await count();
+  for (let i = 0; i < 99; i++) await page.keyboard.press(String(1 + i % 4));
+  await page.keyboard.press("4");
+  await until(([from, name]) => told.slice(from).some(t => t.kind === "load" && t.detail.done &&
+    t.detail.record.request.technique.name === name), [from, names[3]]);
+  await page.waitForTimeout(300);
+  const last = await page.evaluate(() => told.findLast(t => t.kind === "load").detail.record.request);
+  assert.equal(last.technique.name, names[3]);
+  assert.equal(await page.locator("#technique").inputValue(), names[3]);
+  assert.equal(watched.under.size, 0);
+  assert.ok(watched.most <= 2, watched.most + " at once");
+});
+
+test("the picture is never blank, gets better in sight, and says how good it is", async () => {
+  await open(at("scene=" + SCENE + "&width=240&height=180&technique=raytraced"));
+  await loaded();
+  await page.evaluate(() => {
+    globalThis.blank = 0;
+    globalThis.frames = 0;
+    const canvas = document.querySelector("#view").shadowRoot.querySelector("canvas");
+    const look = () => {
+      const { width, height } = canvas;
+      if (canvas.getContext("2d").getImageData(width >> 1, height >> 1, 1, 1).data[3] !== 255) blank++;
+      frames++;
+      requestAnimationFrame(look);
+    };
+    look();
+  });
+  const box = await page.locator("#view").boundingBox();
+  await page.mouse.move(box.x + box.width / 2, box.y + box.height * 0.6);
+  await page.mouse.down();
+  for (let step = 1; step <= 15; step++) await page.mouse.move(box.x + box.width / 2 + 6 * step, box.y + box.height * 0.6);
+  const from = await count();
+  await page.mouse.up();
+  await loaded(from);
+  await page.keyboard.press("4");
+  await until(() => told.at(-1).kind === "timing");
+  assert.ok(await page.evaluate(() => frames) > 5);
+  assert.equal(await page.evaluate(() => blank), 0);
+  await page.locator("#technique").selectOption("raytraced");
+  const samples = page.locator("#panel-method .field", { hasText: "samples" }).locator("input");
+  const before = await count();
+  await samples.fill("512");
+  await samples.press("Enter");
+  await until(from => told.slice(from).some(t => t.kind === "load" && t.detail.done &&
+    t.detail.record.request.technique.params.samples === 512), before);
+  assert.match(await text(".facts"), /512 of 512 samples± \.\d+240 × 180/);
+});
+
 test("two methods are wiped, blinked and mapped", async () => {
   await open(at(SMALL + "&technique=hard&b=raytraced"));
   await until(() => told.some(t => t.kind === "load" && t.detail.done &&

@@ -83,6 +83,7 @@ export function mount(element, store, api) {
     stop?.abort();
     const { signal } = stop = new AbortController();
     layer.classList.add("waiting");
+    figures.textContent = "Measuring…";
     try {
       const { methods: [row] } = await api.daemon.compare(scene, request, { signal });
       const link = row.links?.[MAPS[kind].link];

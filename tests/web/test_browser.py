@@ -3,6 +3,7 @@
 usage: test_browser.py FOLDER TEST: the packages of package.json are kept in FOLDER, pictures of the
 pages go to its folder pictures; TEST is a file of this folder. Exits 77 (skipped) without Chromium, node, or the packages."""
 import http.server
+import glob
 import os
 import shutil
 import subprocess
@@ -51,7 +52,7 @@ class Browser(unittest.TestCase):
         os.makedirs(pictures, exist_ok=True)
         self.assertEqual(run_node(
             TEST, 120 * PATIENCE, DAEMON="http://127.0.0.1:%d" % d.port, SCENE=name,
-            SCENE_FILE=scene,
+            SCENE_FILE=scene, PYTHON_PACKAGE=":".join(glob.glob(os.path.join(BIN, "../python/*.whl"))),
             CHROMIUM=CHROMIUM, PATIENCE_MS=str(int(10000 * PATIENCE)), PACKAGES=FOLDER,
             CLIENT=os.path.join(BIN, "penumbra"), PICTURES=pictures,
             CONTROL="http://127.0.0.1:%d" % control.server_port), 0)

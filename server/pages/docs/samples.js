@@ -15,7 +15,7 @@ export function exampleOf(api, path, call) {
 export const fill = (path, given) =>
   path.replace(/\{(\w+)\}/g, (whole, name) => encodeURIComponent(given[name] ?? whole));
 
-const shell = text => "'" + text.replaceAll("'", "'\\''") + "'";
+export const shell = text => "'" + text.replaceAll("'", "'\\''") + "'";
 /** JSON with lines, short lists on one. */
 export const pretty = value => JSON.stringify(value, null, 2)
   .replace(/\[\s+([^[\]{}]{1,60}?)\s+\]/g, (_, inside) => "[" + inside.replace(/\s+/g, " ") + "]");
@@ -49,7 +49,7 @@ function python(value, indent = "") {
 
 /** A request's keys as keywords: what the document has in objects of its own for order only is not
  * nested in Python. */
-function keywords(body) {
+export function keywords(body) {
   const flat = {};
   for (const [key, value] of Object.entries(body)) {
     if (key === "output" || key === "sequence") Object.assign(flat, value);

@@ -1,7 +1,7 @@
 // What the picture shows, how large, and as which file.
 import { h } from "../dom.js";
 import { choiceField, numberField } from "../fields.js";
-import { requestOf, techniqueOf } from "../state.js";
+import { download } from "../request.js";
 
 export function mount(element, store, api) {
   const set = key => value => store.set({ [key]: value });
@@ -16,15 +16,6 @@ export function mount(element, store, api) {
     format: choiceField({ label: "format", choices: ["png"],
       value: "png", start: "png", take: set("format") }),
   };
-  const download = api.guard(async () => {
-    const { scene, format, layer } = store.state, shown = api.record.request;
-    const picture = await api.daemon.render(scene, { ...requestOf(store.state, api.first?.exposure_ev),
-      technique: techniqueOf(store.state), camera: api.view.currentCamera, lights: shown.lights,
-      width: shown.width, height: shown.height, output: { format, layer } });
-    const link = h("a", { href: picture.url, download: "penumbra." + format });
-    link.click();
-    setTimeout(() => picture.release(), 1000);
-  });
   const known = api.guard(async () => { // not needed for the first picture
     const { layer, format } = (await api.schemas()).Output.properties;
     fields.layer.offer(layer.enum.filter(name => name !== "all"));
@@ -34,7 +25,7 @@ export function mount(element, store, api) {
   api.addEventListener("picture", known, { once: true });
   element.classList.add("fields");
   element.append(...Object.values(fields), h("button", { type: "button", class: "wide",
-    onclick: download }, "Download"));
+    onclick: api.guard(() => download(store, api)) }, "Download"));
   store.on(["layer", "width", "height", "antialias", "format"], show);
 
   function show(state) {

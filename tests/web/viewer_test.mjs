@@ -200,7 +200,7 @@ test("a download is the picture in the format that is asked for", async () => {
   await open(at(SMALL + "&format=webp"));
   await loaded();
   const [file] = await Promise.all([page.waitForEvent("download"),
-    page.getByRole("button", { name: "Download" }).click()]);
+    page.locator("#panel-output").getByRole("button", { name: "Download" }).click()]);
   assert.equal(file.suggestedFilename(), "penumbra.webp");
   assert.equal(readFileSync(await file.path()).subarray(8, 12).toString(), "WEBP");
 });

@@ -266,19 +266,28 @@ static const struct row *find_flag(const char *argument, const char **value)
     return NULL;
 }
 
+/* What others call the address and port to listen on. */
+static const char *const others_names[] = {"--port", "--host", "--bind", "--address", "--http"};
+
 /* What to say of an argument that is no setting. */
 static bool fail_flag(const char *argument, struct pen_error *error)
 {
     char names[ROWS][64], given[64], end[96];
-    struct pen_suggestion suggestion = {.word = given};
-    if (*argument != '-')
+    /* The dashes are alike in all and say nothing. */
+    struct pen_suggestion suggestion = {.word = given + 2};
+    if (strncmp(argument, "--", 2))
         return pen_fail(error, PEN_INVALID, "",
             "\"%.60s\" is no setting: they look like --queue-limit 64; see --help.", argument);
     snprintf(given, sizeof given, "%.*s", (int)strcspn(argument, "="), argument);
     for (size_t r = 0; r < ROWS; r++) {
         flag_name(&rows[r], names[r]);
-        pen_suggest(&suggestion, names[r]);
+        pen_suggest(&suggestion, names[r] + 2);
     }
+    if (suggestion.best)
+        suggestion.best -= 2;
+    for (size_t i = 0; i < sizeof others_names / sizeof *others_names; i++)
+        if (!strcmp(given, others_names[i]))
+            suggestion.best = "--listen";
     return pen_fail(error, PEN_INVALID, "", "There is no setting %s%s", given,
         pen_suggest_end(&suggestion, end, sizeof end));
 }

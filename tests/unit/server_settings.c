@@ -54,6 +54,8 @@ static void test_config(void)
     static const struct {
         const char *flag, *value, *message;
     } told[] = {{"--require-gpu", "perhaps", "--require-gpu must be on or off, not \"perhaps\"."},
+        {"--port", "80", "There is no setting --port; did you mean \"--listen\"?"},
+        {"-p", "80", "\"-p\" is no setting: they look like --queue-limit 64; see --help."},
         {"--queue-limt", "3", "There is no setting --queue-limt; did you mean \"--queue-limit\"?"},
         {"--queue-limit", "--workers", "--queue-limit needs a value."},
         {"--log-format", "xml", "--log-format must be text or json, not \"xml\"."},

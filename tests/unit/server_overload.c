@@ -75,6 +75,7 @@ struct flight {
     double left_ms, turns_ms;
 };
 static struct flight flights[AT_ONCE];
+static double speed = 1; /* of the machine */
 
 /* Those of comparisons come one after the other. */
 static enum take fits(void *context, struct render *render)
@@ -96,10 +97,11 @@ static double uniform(void)
 
 /* What is asked for, how often, and what it takes. */
 struct load {
-    double rate;       /* requests a second */
-    double compared;   /* share of comparisons */
-    double takes_ms;   /* a render */
-    double told;       /* share of that which is told as the renderer's */
+    double rate;     /* requests a second */
+    double compared; /* share of comparisons */
+    double takes_ms; /* a render */
+    double told;     /* share of that which is told as the renderer's */
+    double swing; /* the machine is so many times as fast, or slow, at most; 0: always the same */
     double measure_ms; /* beside the renderer, of each image of a comparison */
 };
 
@@ -120,7 +122,7 @@ static void work(struct scheduler *s, double ms)
         struct render *render = f->render;
         if (!render)
             continue;
-        f->left_ms -= ms / n;
+        f->left_ms -= ms * speed / n;
         struct pen_result result = {.turns_ms = f->turns_ms};
         struct outcome outcome = {.result = &result};
         if (!scheduler_is_wanted(s, render)) {
@@ -177,15 +179,16 @@ static void ask(struct scheduler *s, const struct load *load)
 
 static void flood(struct scheduler *s, const struct load *load, double seconds)
 {
-    double due_ms = 0, at_ms = 0;
+    double due_ms = 0, at_ms = 0, turn_ms = 0;
     uint64_t began = now_ns;
+    speed = 1;
     renders = comparisons = (struct tally){0};
     while (at_ms < 1e3 * seconds) {
         double step = due_ms - at_ms;
         feed(s, load);
         for (int i = 0; i < AT_ONCE; i++)
             if (flights[i].render)
-                step = fmin(step, flights[i].left_ms * in_flight());
+                step = fmin(step, flights[i].left_ms * in_flight() / speed);
         step = fmax(step, 1e-3);
         at_ms += step;
         now_ns = began + (uint64_t)(at_ms * 1e6);
@@ -194,6 +197,10 @@ static void flood(struct scheduler *s, const struct load *load, double seconds)
         if (at_ms < due_ms)
             continue;
         due_ms += -log(uniform()) * 1e3 / load->rate;
+        if (load->swing > 1 && at_ms > turn_ms) {
+            speed = pow(load->swing, 2 * uniform() - 1);
+            turn_ms = at_ms + 1e3 * (0.5 + 3 * uniform());
+        }
         ask(s, load);
     }
     is_over = true;
@@ -250,6 +257,23 @@ static void test_mixed(double times, double measure_ms)
     scheduler_destroy(s);
 }
 
+/* The machine does other things, too. */
+static void test_swing(double swing)
+{
+    struct scheduler *s = make();
+    struct load load = {.rate = 5, .takes_ms = 50, .told = 0.8, .swing = swing};
+    flood(s, &load, 20);
+    load.rate = 3 * 1e3 / load.takes_ms;
+    flood(s, &load, 200);
+    const struct tally *r = &renders;
+    uint32_t refused = r->at_once + r->afterwards;
+    printf("swing %.1f: %u good, %u late, %u + %u refused\n", swing, r->good, r->late, r->at_once,
+        r->afterwards);
+    CHECK(r->late <= 0.02 * r->good);
+    CHECK(r->afterwards <= 0.01 * refused);
+    scheduler_destroy(s);
+}
+
 int main(void)
 {
     static const double told[] = {1, 0.6, 0.3};
@@ -259,5 +283,7 @@ int main(void)
     for (double times = 2; times < 4; times++)
         for (double measure_ms = 20; measure_ms < 100; measure_ms *= 2)
             test_mixed(times, measure_ms);
+    for (double swing = 1.2; swing < 1.7; swing += 0.2)
+        test_swing(swing);
     CHECK_DONE();
 }

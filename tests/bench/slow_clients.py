@@ -3,7 +3,8 @@
 
     slow_clients.py [--bin DIR] [--clients 1000] [--addresses 20] [--rounds 6] [--requests 300]
 
-Rounds with and without them alternate. In each, requests of their own connections follow one another:
+Rounds without them, beside them, and beside as many at another service of the same machine (what their
+processors cost everybody) alternate. In each, requests of their own connections follow one another:
 a method's description, a small picture from the cache, and now and then a new one and an upload. A third
 of the slow clients send headers, a third bodies, a third read answers, byte by byte, and come again
 when they are put out. Printed: how many of the quick were answered, and their times.
@@ -56,12 +57,14 @@ def main():
         os.environ["PENUMBRA_BIN"] = given.bin
     import harness
     import swarm
-    daemon = harness.Daemon()
-    scene = daemon.upload(harness.grid_scene(2, "slow clients"))
-    alone, beside, lost = [], [], 0
+    daemon, other = harness.Daemon(), harness.Daemon()
+    scene, elsewhere = (d.upload(harness.grid_scene(2, "slow clients")) for d in (daemon, other))
+    alone, beside, apart, lost = [], [], [], 0
     for n in range(given.rounds):
         times, more = quick(daemon, scene, given.requests, "alone %d" % n)
         alone += times
+        with swarm.Swarm(other.port, elsewhere, given.clients, given.addresses):
+            apart += quick(daemon, scene, given.requests, "apart %d" % n)[0]
         with swarm.Swarm(daemon.port, scene, given.clients, given.addresses) as slow:
             times, missing = quick(daemon, scene, given.requests, "beside %d" % n)
         beside += times
@@ -71,9 +74,11 @@ def main():
     print("answered: %d of %d" % (2 * given.rounds * given.requests - lost,
                                   2 * given.rounds * given.requests))
     for share in (0.5, 0.99):
-        a, b = percentile(alone, share), percentile(beside, share)
-        print("p%g: alone %.2f ms, beside them %.2f ms: %.2f times" % (share * 100, a, b, b / a))
+        a, b, c = (percentile(times, share) for times in (alone, beside, apart))
+        print("p%g: alone %.2f ms, beside them %.2f ms: %.2f times; beside those of another service "
+              "%.2f ms: %.2f times" % (share * 100, a, b, b / a, c, c / a))
     daemon.stop()
+    other.stop()
 
 
 if __name__ == "__main__":

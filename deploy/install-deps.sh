@@ -64,7 +64,7 @@ python3
 "
 # Taken where the machine offers them; what they are for is left out without them.
 runtime_extra="libosmesa6"
-test_extra="clang clang-tidy cppcheck mypy python3-imageio python3-venv"
+test_extra="clang clang-tidy cppcheck mypy python3-imageio python3-venv libopenapi-client-perl mandoc zsh fish"
 # libFuzzer comes with clang.
 fuzz="
 clang

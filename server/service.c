@@ -296,10 +296,13 @@ void service_reload(struct service *s)
     const struct config *c = s->config;
     struct pen_error error = {0};
     struct tls_identity *tls = NULL;
-    bool ok = (!s->auth || auth_reload(s->auth, c->token_file, &error)) &&
-              (!*c->tls_cert || (tls = tls_identity_load(c->tls_cert, c->tls_key, &error)));
-    if (tls)
+    /* What can fail first: all of it is changed, or nothing. */
+    bool ok = (!*c->tls_cert || (tls = tls_identity_load(c->tls_cert, c->tls_key, &error))) &&
+              (!s->auth || auth_reload(s->auth, c->token_file, &error));
+    if (ok && tls)
         door_set_tls(http_listener_door(s->listener), tls);
+    else
+        tls_identity_destroy(tls);
     if (ok)
         log_event(LOG_INFO, "tokens and certificates were read again");
     else

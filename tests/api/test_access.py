@@ -2,6 +2,7 @@
 import json
 import os
 import signal
+import socket
 import ssl
 import threading
 import unittest
@@ -244,6 +245,41 @@ class Access(unittest.TestCase):
         os.kill(d.process.pid, signal.SIGHUP)
         wait(lambda: "nothing is changed" in d.log())
         self.assertEqual(of().strip(), new)
+        self.assertEqual(d.stop(), 0)
+
+    def test_all_is_read_again_or_nothing(self):
+        d = Daemon(start=False)
+        self.addCleanup(d.kill)
+        cert, key = certificate(d.folder)
+        self.file = os.path.join(d.folder, "tokens")
+        self.write("alice old-alice-old-alice-old\n")
+        d.flags += ["--tls-cert=" + cert, "--tls-key=" + key, "--token-file=" + self.file]
+        d.start()
+        context = ssl._create_unverified_context()
+
+        def get(token):
+            with socket.create_connection(("127.0.0.1", d.port), timeout=60) as plain:
+                with context.wrap_socket(plain) as s:
+                    s.sendall(b"GET /v1 HTTP/1.1\r\nHost: x\r\nConnection: close\r\n"
+                              b"Authorization: Bearer %s\r\n\r\n" % token.encode())
+                    return int(s.recv(4096).split()[1])
+        of = lambda: ssl.get_server_certificate(("127.0.0.1", d.port)).strip()
+        first = of()
+        old, new = "old-alice-old-alice-old", "new-alice-new-alice-new"
+        with open(key) as file:
+            good = file.read()
+        for what in ("key", "tokens"):
+            certificate(d.folder) if what == "tokens" else None
+            self.write("alice %s\n" % new if what == "key" else "alice short\n")
+            if what == "key":
+                with open(key, "w") as file:
+                    file.write("no key")
+            before = d.log().count("nothing is changed")
+            os.kill(d.process.pid, signal.SIGHUP)
+            wait(lambda: d.log().count("nothing is changed") == before + 1)
+            self.assertEqual((get(old), get(new), of()), (200, 401, first), what)
+            with open(key, "w") as file:
+                file.write(good)
         self.assertEqual(d.stop(), 0)
 
     def test_beyond_loopback(self):

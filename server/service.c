@@ -341,12 +341,8 @@ struct service *service_create(
     }
     if (*config->token_file && !(s->auth = auth_load(config->token_file, error)))
         goto fail;
-    s->openapi = pen_openapi_json(catalogue, PENUMBRA_VERSION);
-    struct hash *hash = hash_create();
-    uint8_t digest[PEN_ID_BYTES];
-    hash_add(hash, s->openapi, strlen(s->openapi));
-    hash_finish(hash, digest);
-    pen_id_to_hex(digest, s->openapi_tag);
+    pages_make(&s->openapi, PAGE_JSON, pen_openapi_json(catalogue, PENUMBRA_VERSION));
+    pages_make(&s->techniques, PAGE_JSON, pen_techniques_json(catalogue));
     if (!make_canary(s, error) ||
         !(s->store = scene_store_open(config->store, config->store_limit.bytes, error)) ||
         (s->auth && !open_owners(s, error)))
@@ -443,7 +439,8 @@ void service_destroy(struct service *s, const bool *hurry)
     auto_runs_destroy(s->auto_runs);
     auth_destroy(s->auth);
     owners_close(s->owners);
-    free(s->openapi);
+    pages_unmake(&s->openapi);
+    pages_unmake(&s->techniques);
     pthread_mutex_destroy(&s->canary_lock);
     free(s);
 }

@@ -24,7 +24,8 @@ enum {
 
 const char *const page_mime[] = {[PAGE_HTML] = "text/html; charset=utf-8",
     [PAGE_MODULE] = "text/javascript; charset=utf-8",
-    [PAGE_STYLE] = "text/css; charset=utf-8"};
+    [PAGE_STYLE] = "text/css; charset=utf-8",
+    [PAGE_JSON] = "application/json"};
 
 static struct page_file files[PAGES] = {
 #define PAGE(symbol, type_, path_, ...)                                                            \
@@ -41,7 +42,7 @@ static void tag(struct page_bytes *file)
     pen_id_to_hex(digest, file->tag);
 }
 
-/* As gzip (RFC 1952), kept as long as the program runs. */
+/* As gzip (RFC 1952). */
 static void squeeze(struct page_file *file)
 {
     z_stream z = {0};
@@ -60,6 +61,25 @@ static void squeeze(struct page_file *file)
     deflateEnd(&z);
 }
 
+static void complete(struct page_file *file)
+{
+    squeeze(file);
+    tag(&file->plain);
+    tag(&file->gzip);
+}
+
+void pages_make(struct page_file *file, enum page_type type, char *text)
+{
+    *file = (struct page_file){.type = type, .plain = {.data = text, .bytes = strlen(text)}};
+    complete(file);
+}
+
+void pages_unmake(struct page_file *file)
+{
+    free((void *)(uintptr_t)file->plain.data);
+    free((void *)(uintptr_t)file->gzip.data);
+}
+
 static void prepare(void)
 {
     const char *const ends[] = {
@@ -68,9 +88,7 @@ static void prepare(void)
     };
     for (int i = 0; i < PAGES; i++) {
         files[i].plain.bytes = (size_t)(ends[i] - (const char *)files[i].plain.data);
-        squeeze(&files[i]);
-        tag(&files[i].plain);
-        tag(&files[i].gzip);
+        complete(&files[i]);
     }
 }
 

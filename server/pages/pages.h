@@ -4,7 +4,7 @@
 #include "protocol/limits.h"
 #include <stddef.h>
 
-enum page_type { PAGE_HTML, PAGE_MODULE, PAGE_STYLE };
+enum page_type { PAGE_HTML, PAGE_MODULE, PAGE_STYLE, PAGE_JSON };
 
 /* A file in one coding; the tag is of these very bytes. */
 struct page_bytes {
@@ -14,10 +14,13 @@ struct page_bytes {
 };
 struct page_file {
     enum page_type type;
-    const char *path; /* its address below "/" */
+    const char *path; /* its address below "/"; NULL for a document made at run time */
     struct page_bytes plain, gzip;
 };
 
 /* The file at an address below "/", or NULL. Thread-safe. */
 const struct page_file *pages_find(const char *path);
+/* Makes a document of a malloc'd text, which it takes. Ends with pages_unmake. */
+void pages_make(struct page_file *file, enum page_type type, char *text);
+void pages_unmake(struct page_file *file); /* all zero is fine */
 extern const char *const page_mime[];

@@ -11,6 +11,7 @@
 #include "server/jobs/jobs.h"
 #include "server/gallery/labels.h"
 #include "server/live/feed.h"
+#include "server/pages/pages.h"
 #include "server/queue/scheduler.h"
 #include "server/uploads/importer.h"
 #include "server/uploads/places.h"
@@ -40,7 +41,7 @@ struct service {
     char public_name[PROXY_NAME_BYTES], public_prefix[PROXY_PREFIX_BYTES]; /* of --public-url */
     bool admin_is_open; /* the admin listener asks for no token */
     struct http_listener *listener, *admin;
-    char *openapi, openapi_tag[PEN_ID_HEX + 1];
+    struct page_file openapi, techniques; /* documents that never change */
     uint64_t started_ns;
     int canary_blob; /* a plane, as a blob in a memfd */
     uint8_t canary_id[PEN_ID_BYTES];

@@ -10,12 +10,9 @@
 #include <string.h>
 
 /* Asked for again each time, and sent when it is another. */
-static bool answer_file(struct call *call, const char *path, struct pen_error *error)
+static bool answer_page(struct call *call, const struct page_file *file)
 {
     struct http_exchange *x = call->exchange;
-    const struct page_file *file = pages_find(path);
-    if (!file)
-        return pen_fail(error, PEN_NOT_FOUND, "", "There is nothing at this address.");
     bool squeezed = accept_coding(http_header(x, "Accept-Encoding"), "gzip");
     const struct page_bytes *sent = squeezed ? &file->gzip : &file->plain;
     if (file->type == PAGE_HTML)
@@ -31,6 +28,13 @@ static bool answer_file(struct call *call, const char *path, struct pen_error *e
         http_add_header(x, "Content-Encoding", "gzip");
     http_answer(x, 200, page_mime[file->type], http_static(sent->data, sent->bytes));
     return true;
+}
+
+static bool answer_file(struct call *call, const char *path, struct pen_error *error)
+{
+    const struct page_file *file = pages_find(path);
+    return file ? answer_page(call, file)
+                : pen_fail(error, PEN_NOT_FOUND, "", "There is nothing at this address.");
 }
 
 bool route_home(struct call *call, struct pen_error *error)
@@ -73,18 +77,13 @@ bool route_viewer_panel(struct call *call, struct pen_error *error)
 bool route_openapi(struct call *call, struct pen_error *error)
 {
     (void)error;
-    const struct service *s = call->service;
-    http_add_header(call->exchange, "Cache-Control", "no-cache");
-    if (!call_not_modified(call, s->openapi_tag))
-        http_answer(
-            call->exchange, 200, "application/json", http_static(s->openapi, strlen(s->openapi)));
-    return true;
+    return answer_page(call, &call->service->openapi);
 }
 
 bool route_techniques(struct call *call, struct pen_error *error)
 {
     (void)error;
-    return call_json(call, 200, pen_techniques_json(call->service->catalogue));
+    return answer_page(call, &call->service->techniques);
 }
 
 bool route_technique(struct call *call, struct pen_error *error)

@@ -1,4 +1,5 @@
 """Answers against the daemon's own OpenAPI document: the part of JSON Schema that it uses."""
+import gzip
 import json
 import re
 
@@ -179,6 +180,8 @@ class Document:
         elif method != "HEAD":
             assert kind in content, "%s: %s is not in the document" % (said, kind)
             schema = content[kind].get("schema")
-            value = json.loads(answer.body) if kind.endswith("json") else answer.body.decode("latin-1")
+            coded = answer.headers.get("Content-Encoding") == "gzip"
+            body = gzip.decompress(answer.body) if coded else answer.body
+            value = json.loads(body) if kind.endswith("json") else body.decode("latin-1")
             wrong = self.problems(value, schema) if schema else []
             assert not wrong, "%s:\n  %s" % (said, "\n  ".join(wrong[:8]))

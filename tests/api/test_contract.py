@@ -89,6 +89,10 @@ class Contract(unittest.TestCase):
                     again = self.d.get(url, Accept_Encoding=coding,
                                        If_None_Match=tag.headers["ETag"])
                     self.assertEqual((again.status, again.body), (304, b""))
+        for url in ("/openapi.json", "/v1/techniques"):
+            plain, small = self.d.get(url), self.d.get(url, Accept_Encoding="gzip")
+            self.assertEqual(gzip.decompress(small.body), plain.body)
+            self.assertEqual(self.d.get(url, If_None_Match=plain.headers["ETag"]).status, 304)
         for refusal in ("identity", "gzip;q=0", "*;q=0", "gzip;q=0, *"):
             answer = self.d.get("/viewer/main.js", Accept_Encoding=refusal)
             self.assertNotIn("Content-Encoding", answer.headers, refusal)

@@ -174,8 +174,10 @@ static bool send_file(
     if (is_document && !text)
         return false;
     uint64_t bytes = text ? strlen(text) : file->bytes, from = 0, count = bytes;
-    enum range range = range_read(
-        http_header(x, "Range"), http_header(x, "If-Range"), file->tag, bytes, &from, &count);
+    /* Ranges are GET's alone (RFC 9110, 14.2). */
+    const char *asked = strcmp(x->method, "GET") ? NULL : http_header(x, "Range");
+    enum range range =
+        range_read(asked, http_header(x, "If-Range"), file->tag, bytes, &from, &count);
     add_expiry(call, job);
     http_add_header(x, "Accept-Ranges", "bytes");
     bool known = call_not_modified(call, file->tag);

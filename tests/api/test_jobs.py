@@ -247,6 +247,8 @@ class Jobs(unittest.TestCase):
                         {"Range": "lines=1-2"}, {"Range": "bytes=5-2"}):
             answer = self.d.get(path, **ignored)
             self.assertEqual((answer.status, answer.body), (200, whole.body), ignored)
+        head = self.d.exchange("HEAD", path, headers={"Range": "bytes=0-5"})
+        self.assertEqual((head.status, head.headers["Content-Length"]), (200, str(size)))
         outside = self.d.get(path, Range="bytes=%d-" % size)
         self.problem(outside, 416)
         self.assertEqual(outside.headers["Content-Range"], "bytes */%d" % size)

@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import { after, before, test } from "node:test";
 import { join } from "node:path";
-import { DAEMON, PICTURES, close, loaded, loadedWith, open, page, shown, until, viewer,
+import { DAEMON, PICTURES, close, findings, loaded, loadedWith, open, page, shown, until, viewer,
   watched } from "./page.mjs";
 
 let scene;
@@ -56,6 +56,7 @@ test("a scene with animations has a time line, which poses it", async () => {
   assert.notEqual(await shown(), before);
   await until(() => /animation=turn.*time_s=1/.test(location.hash)); // written when all is still
   await page.screenshot({ path: join(PICTURES, "animation-desktop.png") });
+  assert.deepEqual(await findings(), []);
 });
 
 test("it plays as fast as asked, in small pictures, one question at a time", async () => {

@@ -6,7 +6,7 @@ import { mkdtemp, readFile, writeFile } from "node:fs/promises";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { promisify } from "node:util";
-import { DAEMON, PICTURES, SCENE, close, loaded, loadedWith, open, page, until, viewer,
+import { CONTROL, DAEMON, PICTURES, SCENE, close, findings, loaded, loadedWith, open, page, until, viewer,
   watched } from "./page.mjs";
 
 after(close);
@@ -43,6 +43,7 @@ test("a turntable goes around what the view looks at, is watched, played and kep
   await button("New sequence").click();
   await fill({ frames: 4, width: 160, height: 120 });
   await page.screenshot({ path: join(PICTURES, "jobs-form.png") });
+  assert.deepEqual(await findings(), []);
   const [request, { id }] = await start();
   // By quarters around +y, from +z towards +x: what is seen from (-1, 1, 8) off the target.
   [[-1, 1, 8], [8, 1, 1], [1, 1, -8], [-8, 1, -1]].forEach((off, i) => {
@@ -68,6 +69,7 @@ test("a turntable goes around what the view looks at, is watched, played and kep
   }
   assert.equal(seen.size, 4);
   await page.screenshot({ path: join(PICTURES, "jobs-player.png") });
+  assert.deepEqual(await findings(), []);
   await button("Close", page.locator(".player")).click();
   await button("Remove", job()).click();
   await until(() => !document.querySelector(".jobs li"));
@@ -106,6 +108,20 @@ test("a job is cancelled", async () => {
   await button("Cancel", job()).click();
   await over();
   assert.equal((await api("/v1/jobs/" + id)).state, "dismissed");
+});
+
+test("a job is shown again when the daemon is back", async () => {
+  await button("New sequence").click();
+  await button("Turntable", form()).click();
+  await fill({ frames: 60, width: 160, height: 120 });
+  const [, { id }] = await start();
+  await until(() => document.querySelector(".jobs progress").value > 0);
+  await fetch(CONTROL + "/kill");
+  await until(() => document.querySelector(".jobs .failed"));
+  await fetch(CONTROL + "/start");
+  await until(id => document.querySelector(".jobs li:not(.failed)[data-id='" + id + "']"), id);
+  await over();
+  assert.match(await job().textContent(), /60 of 60 frames/);
 });
 
 test("jobs on a phone", async () => {

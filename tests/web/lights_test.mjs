@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import { after, test } from "node:test";
 import { join } from "node:path";
-import { PICTURES, SCENE, close, count, loaded, loadedWith, open, page, until, viewer,
+import { PICTURES, SCENE, close, count, findings, loaded, loadedWith, open, page, until, viewer,
   watched } from "./page.mjs";
 
 after(close);
@@ -168,6 +168,7 @@ for (const [name, options] of [["desktop", { viewport: { width: 1440, height: 90
     await button("Light 2, spot").click();
     await until(() => document.querySelectorAll(".handle.chosen").length === 3);
     await page.screenshot({ path: join(PICTURES, "lights-" + name + ".png") });
+    assert.deepEqual(await findings(), []);
     assert.equal(await page.evaluate(() => document.documentElement.scrollWidth - innerWidth), 0);
     if (name === "phone") { // by a finger
       const [x, y] = await middle(handle(1, "rect", "position")), from = await count();

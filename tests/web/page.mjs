@@ -1,7 +1,10 @@
 // A page in Chromium, what goes wrong in it, what it asks the daemon for, and what its view tells.
+import { readFileSync } from "node:fs";
 import { createRequire } from "node:module";
 
-const { chromium } = createRequire(process.env.PACKAGES + "/")("playwright-core");
+const packages = createRequire(process.env.PACKAGES + "/");
+const { chromium } = packages("playwright-core");
+const AXE = readFileSync(packages.resolve("axe-core/axe.min.js"), "utf8");
 /** Besides the daemon and what was made for the test: where it is ended (/kill) and started (/start). */
 export const { DAEMON, SCENE, SCENE_FILE, PICTURES, CONTROL } = process.env;
 const PATIENCE_MS = Number(process.env.PATIENCE_MS);
@@ -75,6 +78,13 @@ export const loadedWith = condition => wait(async () => (await page.evaluate(() 
 /** Waits for a refusal behind `from` events, that is tried again or not. */
 export const failed = (from, again) => until(([from, again]) => told.slice(from)
   .some(t => t.kind === "error" && t.detail.again === again), [from, again]);
+/** What axe-core finds wrong with the page. */
+export async function findings() {
+  const { violations } = await page.evaluate(AXE + ";axe.run(document, { resultTypes: ['violations'] })");
+  return violations.map(({ id, nodes }) => id + ": " + nodes.map(node => node.target.join(" ") + " " +
+    node.any.concat(node.all).map(check => check.message).join(" ")).join(" | "));
+}
+
 /** How many events there were. */
 export const count = () => page.evaluate(() => told.length);
 /** The picture that is shown, as text. */

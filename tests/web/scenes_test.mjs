@@ -4,7 +4,7 @@ import { after, test } from "node:test";
 import { mkdir, mkdtemp, readFile, writeFile } from "node:fs/promises";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
-import { DAEMON, PICTURES, SCENE, SCENE_FILE, close, loaded, loadedWith, open, page, until, viewer,
+import { DAEMON, PICTURES, SCENE, SCENE_FILE, close, findings, loaded, loadedWith, open, page, until, viewer,
   watched } from "./page.mjs";
 
 after(close);
@@ -49,6 +49,7 @@ test("an empty service offers a drop zone and three scenes, one click away", asy
   await open(DAEMON + "/", { viewport: { width: 1440, height: 900 }, colorScheme: "light" });
   await until(() => document.querySelector(".empty").checkVisibility());
   await page.screenshot({ path: join(PICTURES, "scenes-empty.png") });
+  assert.deepEqual(await findings(), []);
   for (const name of ["Still life", "Colonnade", "Leaves"]) {
     await page.locator(".samples button", { hasText: name }).evaluate(button => button.click());
     await becomes(name);
@@ -84,6 +85,7 @@ test("what is no scene is said with its reason, and what can be done", async () 
   assert.ok((await alert.locator("[role=alert]").textContent()).length > 10);
   assert.equal(await chosen(), "wedge");
   await page.screenshot({ path: join(PICTURES, "scenes-failed.png") });
+  assert.deepEqual(await findings(), []);
   await alert.getByRole("button", { name: "Close" }).click();
   assert.equal(await alert.count(), 0);
 });
@@ -119,6 +121,7 @@ test("names and tags are changed, and searched", async () => {
   const scene = await api("/v1/scenes/" + SCENE);
   assert.deepEqual([scene.name, scene.tags], ["Garden", ["outdoors", "test"]]);
   await page.screenshot({ path: join(PICTURES, "scenes-details.png") });
+  assert.deepEqual(await findings(), []);
 });
 
 test("warnings of a file are one line, which opens", async () => {

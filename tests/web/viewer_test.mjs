@@ -1,15 +1,13 @@
 // The viewer at / in Chromium, used as people use it.
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
-import { createRequire } from "node:module";
 import { after, test } from "node:test";
 import { join } from "node:path";
-import { CONTROL, DAEMON, PICTURES, SCENE, close, count, loaded, open, page, shown, until,
+import { CONTROL, DAEMON, PICTURES, SCENE, close, count, findings, loaded, open, page, shown, until,
   watched } from "./page.mjs";
 
 after(close);
 
-const AXE = readFileSync(createRequire(process.env.PACKAGES + "/").resolve("axe-core/axe.min.js"), "utf8");
 const SMALL = "scene=" + SCENE + "&width=64&height=48";
 const PHONE = { viewport: { width: 390, height: 844 }, hasTouch: true, isMobile: true };
 const LOOKS = [["desktop", { colorScheme: "light", viewport: { width: 1440, height: 900 } }],
@@ -18,13 +16,6 @@ const LOOKS = [["desktop", { colorScheme: "light", viewport: { width: 1440, heig
 const at = state => DAEMON + "/#" + state;
 const text = selector => page.locator(selector).textContent();
 const picture = name => page.screenshot({ path: join(PICTURES, "viewer-" + name + ".png") });
-
-/** What axe-core finds wrong with the page. */
-async function findings() {
-  const { violations } = await page.evaluate(AXE + ";axe.run(document, { resultTypes: ['violations'] })");
-  return violations.map(({ id, nodes }) => id + ": " + nodes.map(node => node.target.join(" ") + " " +
-    node.any.concat(node.all).map(check => check.message).join(" ")).join(" | "));
-}
 
 for (const [name, options] of LOOKS)
   test("the viewer, " + name, async () => {

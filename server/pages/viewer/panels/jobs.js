@@ -28,7 +28,7 @@ export function mount(element, store, api) {
 
   const load = api.guard(async () => {
     const { jobs } = await api.daemon.json("v1/jobs?limit=" + SHOWN);
-    for (const [id, row] of rows) if (!jobs.some(job => job.id === id)) row.gone();
+    for (const [id, row] of rows) if (row.broken || !jobs.some(job => job.id === id)) row.gone();
     for (const job of jobs.reverse()) if (!rows.has(job.id)) add(new JobHandle(api.daemon, job));
     tell();
   });
@@ -57,7 +57,7 @@ export function mount(element, store, api) {
       ending.disabled = true;
     });
     const item = h("li", { dataset: { id } }, image, h("div", {}, name, bar, said), playing, saving, ending);
-    const row = { gone() {
+    const row = { broken: false, gone() {
       leaving.abort();
       URL.revokeObjectURL(image.src);
       item.remove();
@@ -79,8 +79,8 @@ export function mount(element, store, api) {
     }
 
     function draw() {
-      const { state, frames, bytes: size, error, kind, progress, links } = handle.job;
-      const over = OVER.includes(state), some = frames.done > 0 && kind !== "compare";
+      const { state, frames, bytes: size, error, progress, links } = handle.job;
+      const over = OVER.includes(state), some = hasPictures(handle.job);
       name.textContent = titleOf(handle.job);
       item.classList.toggle("failed", state === "failed");
       bar.hidden = over;
@@ -118,13 +118,14 @@ export function mount(element, store, api) {
       } catch (reason) {
         if (leaving.signal.aborted) return;
         if (reason.status === 404) return row.gone();
+        row.broken = true; // until the daemon is back
         item.classList.add("failed");
         said.textContent = reason.message;
       }
     }
 
     async function preview(number) {
-      if (!handle.job.frames.done || handle.job.kind === "compare") return;
+      if (!hasPictures(handle.job)) return;
       const blob = await handle.frame(number).catch(() => null);
       if (!blob || !SHOWABLE.test(blob.type) || !item.isConnected) return;
       URL.revokeObjectURL(image.src);
@@ -137,12 +138,17 @@ export function mount(element, store, api) {
     return (known.get(id)?.title ?? kind[0].toUpperCase() + kind.slice(1)) + " · " + name;
   }
 
+  api.on("service", load); // it is known, or known again
   let under;
   api.on("live", ({ metrics: { penumbra_jobs_under_way: now } }) => {
-    if (under !== now) load(); // also of other programs of this caller
+    if (under !== undefined && under !== now) load(); // also of other programs of this caller
     under = now;
   });
 }
+
+/** Of what is cancelled nothing is kept. */
+const hasPictures = ({ kind, state, frames }) => frames.done > 0 && kind !== "compare" &&
+  state !== "dismissed";
 
 function offer(blob, name) {
   const url = URL.createObjectURL(blob);

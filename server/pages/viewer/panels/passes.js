@@ -11,7 +11,7 @@ const KEPT = 60;
 export function mount(element, store, api) {
   const total = h("span", { class: "dim" });
   element.tools.append(total);
-  const bar = h("div", { class: "stack", role: "img" });
+  const bar = h("div", { class: "stack", role: "img", "aria-label": "No picture yet" });
   const list = h("ul", { class: "passes", tabIndex: 0, "aria-label": "Passes of this picture" });
   const drawing = svg("svg", { class: "history", role: "img" });
   const plot = h("div", { class: "plot" }, drawing);

@@ -191,7 +191,10 @@ export function mount(element, store, api) {
   }
   let known = false;
   api.on("scenes", () => { known = true; fill(); });
-  store.on(["scene"], fill);
+  store.on(["scene"], () => {
+    fill();
+    list.querySelector("[aria-pressed=true]")?.scrollIntoView({ block: "nearest" });
+  });
   // Of others that share the daemon.
   let stored;
   api.on("live", ({ metrics: { penumbra_scenes: scenes } }) => {

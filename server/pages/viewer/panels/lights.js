@@ -42,7 +42,7 @@ export function mount(element, store, api) {
     });
     const base = rig.base();
     const wanted = light ? [selected, light.type, strength(light)[0], JSON.stringify(base),
-      images.length, patterns.length].join(" ") : "dark";
+      images.length, patterns.length].join(" ") : "none " + rig.known;
     if (wanted !== built) build(light, base);
     built = wanted;
     if (!light) return;
@@ -59,7 +59,7 @@ export function mount(element, store, api) {
   function build(light, base) {
     fields = {};
     if (!light) {
-      box.replaceChildren(h("p", { class: "hint" }, "No light: only the sky."));
+      box.replaceChildren(h("p", { class: "hint" }, rig.known ? "No light: only the sky." : "They come with a scene."));
       return;
     }
     const change = key => value => rig.change({ [key]: value });

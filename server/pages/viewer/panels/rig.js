@@ -148,6 +148,11 @@ export class Rig extends EventTarget {
     return this.lights[this.selected];
   }
 
+  /** Whether the lights are known: the address says them, or a picture has come. */
+  get known() {
+    return this.touched || Boolean(this.#api.record);
+  }
+
   /** Whether they are others than the scene came with. */
   get touched() {
     return this.#store.get("lights") !== null;

@@ -134,7 +134,8 @@ export function mount(element, store, api) {
     sight.observe(image);
     return h("li", {}, h("button", { type: "button", value: scene.id, class: "card",
       "aria-pressed": String(current), onclick: () => current || pick(scene.id) }, image,
-    h("span", {}, h("b", {}, name), h("small", {}, count(scene.triangles) + " triangles"),
+    h("span", {}, h("b", {}, name), h("small", {}, count(scene.triangles) +
+      (scene.triangles === 1 ? " triangle" : " triangles")),
       scene.tags.length > 0 && h("small", { class: "tags" }, scene.tags.map(tag => h("i", {}, tag))))),
     current && warnings(scene), current && editor(scene));
   }

@@ -19,8 +19,8 @@ const CHARTS = [
 
 function chart({ name, lines, say, least }) {
   const values = lines.map(() => []), drawing = svg("svg", { class: "spark", role: "img" });
-  const figures = lines.map(([label], i) => h("span", { dataset: { series: i } }, lines.length > 1 && h("i"),
-    lines.length > 1 && label + " ", h("b", {}, "–")));
+  const figures = lines.map(([label], i) => h("span", { dataset: { series: i }, title: label },
+    lines.length > 1 && [h("i"), h("span", { class: "word" }, label + " ")], h("b", {}, "–")));
   const plot = h("div", { class: "plot" }, drawing);
   const element = h("figure", {}, h("figcaption", {}, h("span", { class: "caption" }, name), h("span", { class: "figures" }, figures)), plot);
   let box = { width: 0, height: 0 };

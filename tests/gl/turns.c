@@ -2,6 +2,7 @@
  * the one it gives in one piece; one that is given up leaves nothing behind. */
 #include "protocol/fnv.h"
 #include "renderer/gl/fiber.h"
+#include "renderer/gl/release.h"
 #include "renderer/gl/target.h"
 #include "tests/gl/fixture.h"
 #include "tests/unit/check.h"
@@ -161,6 +162,7 @@ static void check_methods(struct pen_renderer *r, const uint8_t scenes[2][PEN_ID
 static void check_giving_up(struct pen_renderer *r, const uint8_t scene[PEN_ID_BYTES])
 {
     const struct pen_catalogue *catalogue = pen_renderer_catalogue();
+    gl_release(); /* whose target is made the first time */
     for (uint32_t i = 0; i < catalogue->count; i++) {
         struct pen_request request;
         fixture_request(&request, scene, catalogue->items[i]->name);

@@ -3,25 +3,43 @@
 #include <cglm/cglm.h>
 #include <string.h>
 
-#define SHOWN 1.0f  /* px across: what is smaller receives no shadow that is seen */
+#define SHOWN 1.0f          /* px across: what is smaller receives no shadow that is seen */
+#define MOST_CORNERS 60000u /* of what is looked at triangle by triangle: half a millisecond */
 #define SMALL 0.25f /* of all that casts, across: so much less is worth maps that follow the view */
+
+static float size_of(const float box[2][3])
+{
+    float size[3];
+    glm_vec3_sub((float *)box[1], (float *)box[0], size);
+    return glm_vec3_norm(size);
+}
+
+/* It reaches to the far side of the bounds along an axis. */
+static bool is_far_side(const struct scene *scene, int k, const float box[2][3],
+    const struct caster_light *light, float flat)
+{
+    const struct psc_header *h = scene->blob.header;
+    const float *sun = light->sun, *at = light->origin;
+    bool light_above = sun ? sun[k] < 0 : at[k] > box[1][k];
+    bool light_below = sun ? sun[k] > 0 : at[k] < box[0][k];
+    return (light_above && box[0][k] <= h->bounds_min[k] + flat) ||
+           (light_below && box[1][k] >= h->bounds_max[k] - flat);
+}
+
+static bool is_backdrop(
+    const struct scene *scene, const float box[2][3], const struct caster_light *light, float flat)
+{
+    for (int k = 0; k < 3; k++)
+        if (box[1][k] - box[0][k] <= flat && is_far_side(scene, k, box, light, flat))
+            return true;
+    return false;
+}
 
 bool casters_is_backdrop(const struct scene *scene, const float min[3], const float max[3],
     const struct caster_light *light)
 {
-    const struct psc_header *h = scene->blob.header;
-    const float *sun = light->sun, *at = light->origin;
-    float flat = 1e-4f * scene_radius(scene);
-    for (int k = 0; k < 3; k++) {
-        if (max[k] - min[k] > flat)
-            continue;
-        bool light_above = sun ? sun[k] < 0 : at[k] > max[k];
-        bool light_below = sun ? sun[k] > 0 : at[k] < min[k];
-        if ((light_above && min[k] <= h->bounds_min[k] + flat) ||
-            (light_below && max[k] >= h->bounds_max[k] - flat))
-            return true;
-    }
-    return false;
+    const float box[2][3] = {{min[0], min[1], min[2]}, {max[0], max[1], max[2]}};
+    return is_backdrop(scene, box, light, 1e-5f * scene_radius(scene));
 }
 
 static void grow(float bounds[2][3], const float box[2][3])
@@ -38,13 +56,6 @@ bool casters_overlap(const float a[2][3], const float b[2][3])
         if (a[0][k] > b[1][k] || a[1][k] < b[0][k])
             return false;
     return true;
-}
-
-static float size_of(const float box[2][3])
-{
-    float size[3];
-    glm_vec3_sub((float *)box[1], (float *)box[0], size);
-    return glm_vec3_norm(size);
 }
 
 /* Not beside the picture, and large enough in it. */
@@ -122,6 +133,36 @@ static bool may_cast(
     return casters_overlap(box, (const float(*)[3])to);
 }
 
+/* Of what of an instance casts: a floor may be a part of it. */
+static void instance_casters(const struct scene *scene, uint32_t number,
+    const struct caster_light *light, float casters[2][3])
+{
+    const struct psc_scene *blob = &scene->blob;
+    const struct psc_instance *instance = &blob->instances[number];
+    const struct psc_primitive *p = &blob->primitives[instance->primitive];
+    const float(*box)[3] = (const float(*)[3])scene->instance_bounds[number];
+    /* What coordinates are rounded to: something small may stand on it. */
+    float flat = 2e-7f * size_of(box);
+    bool may_have_floor = false;
+    for (int k = 0; k < 3; k++)
+        may_have_floor |= is_far_side(scene, k, box, light, flat);
+    if (!may_have_floor || p->index_count > MOST_CORNERS) {
+        memcpy(casters, box, 2 * sizeof *casters);
+        return;
+    }
+    psc_bounds_clear(casters[0], casters[1]);
+    for (uint32_t i = 0; i < p->index_count; i += 3) {
+        float triangle[2][3];
+        psc_bounds_clear(triangle[0], triangle[1]);
+        for (uint32_t k = 0; k < 3; k++)
+            psc_bounds_grow_points(instance->world,
+                &blob->positions[blob->indices[p->first_index + i + k]], 1, triangle[0],
+                triangle[1]);
+        if (!is_backdrop(scene, (const float(*)[3])triangle, light, flat))
+            grow(casters, (const float(*)[3])triangle);
+    }
+}
+
 void casters_bounds(const struct scene *scene, const struct view *view, bool ground,
     const struct caster_light *light, float bounds[2][3], float within[2][3])
 {
@@ -130,12 +171,17 @@ void casters_bounds(const struct scene *scene, const struct view *view, bool gro
     psc_bounds_clear(bounds[0], bounds[1]);
     psc_bounds_clear(some[0], some[1]);
     for (uint32_t i = 0; i < scene->blob.instance_count; i++) {
-        const float(*box)[3] = (const float(*)[3])scene->instance_bounds[i];
-        if (casters_is_backdrop(scene, box[0], box[1], light))
+        const float(*all)[3] = (const float(*)[3])scene->instance_bounds[i];
+        float box[2][3];
+        if (casters_is_backdrop(scene, all[0], all[1], light))
             continue;
-        grow(bounds, box);
-        if (shown[0][0] <= shown[1][0] && may_cast(light, (const float(*)[3])shown, box))
-            grow(some, box);
+        instance_casters(scene, i, light, box);
+        if (box[0][0] > box[1][0])
+            continue;
+        grow(bounds, (const float(*)[3])box);
+        if (shown[0][0] <= shown[1][0] &&
+            may_cast(light, (const float(*)[3])shown, (const float(*)[3])box))
+            grow(some, (const float(*)[3])box);
     }
     bool any = bounds[0][0] <= bounds[1][0], few = some[0][0] <= some[1][0];
     for (int k = 0; k < 3; k++)

@@ -414,6 +414,20 @@ static void find_casters(
     casters_bounds(scene, view, ground, &as, light->casters, light->within);
 }
 
+/* Two radii before what the scene is about or, where that is a wide floor with little on it, before what
+ * casts: biases are shares of the distance from there. */
+static void place_sun(struct light *light, const float center[3], float radius)
+{
+    float middle[3], size[3];
+    glm_vec3_sub(light->casters[1], light->casters[0], size);
+    glm_vec3_center(light->casters[0], light->casters[1], middle);
+    float half = 0.5f * glm_vec3_norm(size);
+    bool little = half < 0.25f * radius;
+    for (int i = 0; i < 3; i++)
+        light->origin[i] =
+            (little ? middle : center)[i] - light->z[i] * 2 * (little ? half : radius);
+}
+
 static void make_light(struct light *light, const struct pen_light *source,
     const struct scene *scene, const struct view *view, bool ground)
 {
@@ -437,10 +451,9 @@ static void make_light(struct light *light, const struct pen_light *source,
         }
     }
     make_axes(direction, source->up, light->x, light->y, light->z);
-    if (source->type == PEN_LIGHT_SUN)
-        for (int i = 0; i < 3; i++)
-            light->origin[i] = center[i] - light->z[i] * 2 * radius;
     find_casters(light, scene, view, ground);
+    if (source->type == PEN_LIGHT_SUN)
+        place_sun(light, center, radius);
     light->face_count = 1;
     init_face(&light->faces[0], source);
     set_axes(&light->faces[0], light->origin, light->x, light->y, light->z);

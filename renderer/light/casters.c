@@ -4,7 +4,7 @@
 #include <string.h>
 
 #define SHOWN 1.0f          /* px across: what is smaller receives no shadow that is seen */
-#define MOST_CORNERS 60000u /* of what is looked at triangle by triangle: half a millisecond */
+#define MOST_CORNERS 60000u /* that are looked at one by one: half a millisecond */
 #define SMALL 0.25f /* of all that casts, across: so much less is worth maps that follow the view */
 
 static float size_of(const float box[2][3])
@@ -135,7 +135,7 @@ static bool may_cast(
 
 /* Of what of an instance casts: a floor may be a part of it. */
 static void instance_casters(const struct scene *scene, uint32_t number,
-    const struct caster_light *light, float casters[2][3])
+    const struct caster_light *light, uint32_t *left, float casters[2][3])
 {
     const struct psc_scene *blob = &scene->blob;
     const struct psc_instance *instance = &blob->instances[number];
@@ -146,10 +146,11 @@ static void instance_casters(const struct scene *scene, uint32_t number,
     bool may_have_floor = false;
     for (int k = 0; k < 3; k++)
         may_have_floor |= is_far_side(scene, k, box, light, flat);
-    if (!may_have_floor || p->index_count > MOST_CORNERS) {
+    if (!may_have_floor || p->index_count > *left) {
         memcpy(casters, box, 2 * sizeof *casters);
         return;
     }
+    *left -= p->index_count;
     psc_bounds_clear(casters[0], casters[1]);
     for (uint32_t i = 0; i < p->index_count; i += 3) {
         float triangle[2][3];
@@ -167,6 +168,7 @@ void casters_bounds(const struct scene *scene, const struct view *view, bool gro
     const struct caster_light *light, float bounds[2][3], float within[2][3])
 {
     float shown[2][3], some[2][3];
+    uint32_t left = MOST_CORNERS;
     shown_bounds(scene, view, ground, shown);
     psc_bounds_clear(bounds[0], bounds[1]);
     psc_bounds_clear(some[0], some[1]);
@@ -175,7 +177,7 @@ void casters_bounds(const struct scene *scene, const struct view *view, bool gro
         float box[2][3];
         if (casters_is_backdrop(scene, all[0], all[1], light))
             continue;
-        instance_casters(scene, i, light, box);
+        instance_casters(scene, i, light, &left, box);
         if (box[0][0] > box[1][0])
             continue;
         grow(bounds, (const float(*)[3])box);

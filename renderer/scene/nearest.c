@@ -2,6 +2,8 @@
 #include "renderer/scene/scene.h"
 #include <cglm/cglm.h>
 
+#define MOST_TRIANGLES 30000u /* that are looked at one by one: about a millisecond */
+
 static float box_distance(const float box[2][3], const float point[3])
 {
     float sum = 0;
@@ -66,6 +68,7 @@ static float meshlet_distance(const struct psc_scene *blob, const struct psc_mes
 
 float scene_nearest(const struct scene *s, const float point[3], float most)
 {
+    uint32_t left = MOST_TRIANGLES;
     const struct psc_scene *blob = &s->blob;
     for (uint32_t i = 0; i < blob->instance_count; i++) {
         if (box_distance((const float(*)[3])s->instance_bounds[i], point) >= most)
@@ -80,8 +83,14 @@ float scene_nearest(const struct scene *s, const float point[3], float most)
             const struct psc_meshlet *meshlet = &blob->meshlets[p->first_meshlet + m];
             vec3 center;
             place(world, meshlet->center, point, center);
-            if (glm_vec3_norm(center) - scale * meshlet->radius < most)
-                most = meshlet_distance(blob, meshlet, world, point, most);
+            float bound = glm_vec3_norm(center) - scale * meshlet->radius;
+            uint32_t triangles = meshlet->index_count / 3;
+            if (bound >= most)
+                continue;
+            if (triangles > left)
+                most = fmaxf(bound, 0);
+            else
+                left -= triangles, most = meshlet_distance(blob, meshlet, world, point, most);
         }
     }
     return most;

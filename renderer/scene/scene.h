@@ -124,7 +124,8 @@ void scene_point_in(const struct scene *scene, const double world[3], float poin
 void scene_point_out(const struct scene *scene, const float point[3], double world[3]);
 /* From one point to another, times some power of two: short or long, its square is a float. */
 void scene_direction(const double from[3], const double to[3], float direction[3]);
-/* nearest.c: how near the scene as posed comes to a point, m; `most` where it is no nearer. */
+/* nearest.c: how near the scene as posed comes to a point, m; `most` where it is no nearer. Less than
+ * that where too many triangles are near to look at each. */
 float scene_nearest(const struct scene *scene, const float point[3], float most);
 /* World bounds of one instance: tight, but for scenes of so many vertices that its primitive's
  * transformed box has to do. */

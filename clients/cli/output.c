@@ -69,11 +69,15 @@ int cli_output_end(struct cli_output *output, int status)
 {
     if (!output->file)
         return status;
-    bool ok = !ferror(output->file);
+    FILE *file = output->file;
+    bool ok = !ferror(file);
     errno = ok ? 0 : errno;
-    ok = !(output->part ? fclose(output->file) : fflush(output->file)) && ok;
-    if (output->part && ok && status == CLI_OK)
-        ok = !rename(output->part, output->path);
+    if (output->part) {
+        ok = !fclose(file) && ok;
+        if (ok && status == CLI_OK)
+            ok = !rename(output->part, output->path);
+    } else
+        ok = !fflush(file) && ok;
     if (!ok && status == CLI_OK)
         status = cli_output_fail(output->path, "written");
     if (output->part && status != CLI_OK)

@@ -35,6 +35,26 @@ static void check_repeats(struct pen_renderer *r, const uint8_t *id)
     CHECK(!result.shadow_inputs_reused);
 }
 
+/* The same light of another size: the map from its centre is the same, and so is the picture that it is
+ * drawn anew for. */
+static void check_light_size(struct pen_renderer *r, const uint8_t *id)
+{
+    struct pen_request request;
+    struct pen_result result;
+    fixture_request(&request, id, "pcss");
+    request.lights_given = 1;
+    request.light_count = 1;
+    pen_light_default(&request.lights[0], PEN_LIGHT_RECT);
+    uint64_t first = fixture_render(r, &request, &result);
+    request.lights[0].width *= 0.5f;
+    uint64_t kept = fixture_render(r, &request, &result);
+    CHECK(kept != first);
+    CHECK(result.shadow_inputs_reused);
+    pen_renderer_drop_shadows(r);
+    CHECK(fixture_render(r, &request, &result) == kept);
+    CHECK(!result.shadow_inputs_reused);
+}
+
 /* The completed request, sent again, gives the same picture: it says all there is to say. */
 static void check_completed(struct pen_renderer *r, const uint8_t *id)
 {
@@ -263,6 +283,7 @@ int main(void)
     uint8_t id[PEN_ID_BYTES];
     fixture_scene(r, PEN_GENERATED_DEMO, 0, 0, id);
     check_repeats(r, id);
+    check_light_size(r, id);
     check_completed(r, id);
     check_release(r);
     check_drop(r, id);

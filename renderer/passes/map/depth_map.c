@@ -123,7 +123,7 @@ static bool build_depth(struct technique_run *run, const struct shadow_key *key,
 const struct shadow_input *pass_depth_map(
     struct technique_run *run, uint32_t size, struct pen_error *error)
 {
-    struct shadow_key key = {.kind = "depth", .size = size};
+    struct shadow_key key = {.kind = "depth", .size = size, .of_centre = true};
     run->map_size = size;
     return shadow_cache_get(run, &key, build_depth, error);
 }
@@ -131,7 +131,7 @@ const struct shadow_input *pass_depth_map(
 const struct shadow_input *pass_caster_map(
     struct technique_run *run, uint32_t size, struct pen_error *error)
 {
-    struct shadow_key key = {.kind = "depth", .size = size, .extra = {1}};
+    struct shadow_key key = {.kind = "depth", .size = size, .of_centre = true, .extra = {1}};
     run->map_size = size;
     return shadow_cache_get(run, &key, build_depth, error);
 }

@@ -56,14 +56,14 @@ static bool build(struct technique_run *run, const struct shadow_key *key,
 const struct shadow_input *pass_min_max(
     struct technique_run *run, uint32_t size, struct pen_error *error)
 {
-    struct shadow_key key = {.kind = "min-max", .size = size};
+    struct shadow_key key = {.kind = "min-max", .size = size, .of_centre = true};
     return shadow_cache_get(run, &key, build, error);
 }
 
 const struct shadow_input *pass_caster_min_max(
     struct technique_run *run, uint32_t size, struct pen_error *error)
 {
-    struct shadow_key key = {.kind = "min-max", .size = size, .extra = {1}};
+    struct shadow_key key = {.kind = "min-max", .size = size, .of_centre = true, .extra = {1}};
     run->map_size = size;
     return shadow_cache_get(run, &key, build, error);
 }

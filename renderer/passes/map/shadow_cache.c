@@ -90,7 +90,7 @@ static void use(struct shadow_cache *cache, struct entry *e, uint32_t lane)
 
 static bool is_alike(const struct shadow_key *a, const struct shadow_key *b)
 {
-    return a->size == b->size && !strcmp(a->kind, b->kind) &&
+    return a->size == b->size && a->of_centre == b->of_centre && !strcmp(a->kind, b->kind) &&
            !memcmp(a->extra, b->extra, sizeof a->extra);
 }
 
@@ -125,6 +125,8 @@ const struct shadow_input *shadow_cache_get(struct technique_run *run, const str
     struct shadow_cache *cache = run->ctx->shadows;
     struct face_key face;
     make_face_key(run->face, run->request->casters, &face);
+    if (key->of_centre)
+        memset(face.half, 0, sizeof face.half);
     for (struct entry *e = cache->entries; e; e = e->next)
         if (e->scene == run->scene && !memcmp(&e->pose, &run->scene->pose, sizeof e->pose) &&
             is_alike(&e->key, key) && !memcmp(&e->face, &face, sizeof face)) {

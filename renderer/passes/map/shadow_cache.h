@@ -11,6 +11,7 @@
 struct shadow_key {
     const char *kind;  /* "depth", "minmax", ... */
     uint32_t size;     /* map texels per side */
+    bool of_centre;    /* nothing in it depends on how large the light is */
     uint32_t extra[8]; /* whatever else the content depends on; bit patterns of floats too */
 };
 

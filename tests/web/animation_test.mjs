@@ -65,8 +65,8 @@ test("it plays as fast as asked, in small pictures, one question at a time", asy
   await line("Speed").selectOption("0.25");
   const from = watched.asked.length;
   await page.locator("#stage").focus();
-  await page.keyboard.press("Space");
   const begun = await page.evaluate(() => performance.now());
+  await page.keyboard.press("Space");
   await until(() => Number(document.querySelector(".timeline input").value) > 0.2);
   const [time, now] = await page.evaluate(() =>
     [Number(document.querySelector(".timeline input").value), performance.now()]);

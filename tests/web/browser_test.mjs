@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import { createServer } from "node:http";
 import { after, before, test } from "node:test";
-import { DAEMON, SCENE, close, count, failed, loaded, open, page, shown, until,
+import { DAEMON, SCENE, close, count, failed, idle, loaded, open, page, shown, until,
   watched } from "./page.mjs";
 
 let server;
@@ -86,7 +86,8 @@ test("100 fast changes leave no request behind and end with the right picture", 
   });
   await until(from => told.slice(from).some(t =>
     t.kind === "load" && t.detail.done && t.detail.record.request.technique.name === "pcss"), from);
-  await page.waitForTimeout(500);
+  await page.waitForTimeout(300); // for what should not come
+  await idle();
   const last = await page.evaluate(() => told.filter(t => t.kind === "load").at(-1).detail.record);
   assert.equal(last.request.technique.name, "pcss");
   assert.equal(watched.under.size, 0);

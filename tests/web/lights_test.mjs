@@ -3,7 +3,7 @@ import assert from "node:assert/strict";
 import { after, test } from "node:test";
 import { join } from "node:path";
 import { PICTURES, SCENE, close, count, findings, loaded, loadedWith, open, page, until, viewer,
-  watched } from "./page.mjs";
+  wait, watched } from "./page.mjs";
 
 after(close);
 
@@ -14,14 +14,16 @@ const STATE = { scene: SCENE, camera: CAMERA, lights: [RECT], technique: "hard" 
 const button = name => page.getByRole("button", { name, exact: true });
 const handle = (number, type, kind) => button("Light " + number + ", " + type + ": " + kind);
 const field = name => page.locator("#panel-lights").getByLabel(name, { exact: false });
-/** The lights of the address, once it says something of them that holds. */
+/** The lights of the address, once it rests and says something of them that holds. */
 const stated = async condition => {
   const read = () => JSON.parse(new URL(page.url()).hash.slice(1).split("&").map(pair =>
     pair.split("=")).filter(([key]) => key === "lights").map(([, value]) =>
     decodeURIComponent(value.replaceAll("+", " ")))[0] ?? "null");
-  await until(() => new Promise(resolve => setTimeout(() => resolve(true), 400)));
-  const lights = read();
-  assert.ok(condition(lights), JSON.stringify(lights));
+  const { lights } = await wait(async () => {
+    const before = page.url();
+    await page.waitForTimeout(400);
+    return page.url() === before && condition(read()) && { lights: read() };
+  }, condition);
   return lights;
 };
 const close_to = (given, wanted, tolerance) => given.forEach((value, i) =>

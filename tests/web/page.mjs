@@ -57,7 +57,7 @@ export async function open(url, options = {}) {
 export const close = () => browser?.close();
 
 /** Waits until what `ask` resolves to is true, and returns it. */
-async function wait(ask, what) {
+export async function wait(ask, what) {
   for (const end = Date.now() + PATIENCE_MS; Date.now() < end;) {
     const value = await ask();
     if (value) return value;
@@ -85,6 +85,8 @@ export async function findings() {
     node.any.concat(node.all).map(check => check.message).join(" ")).join(" | "));
 }
 
+/** Waits until no render is under way any more. */
+export const idle = () => wait(() => watched.under.size === 0, "the end of all renders");
 /** How many events there were. */
 export const count = () => page.evaluate(() => told.length);
 /** The picture that is shown, as text. */

@@ -3,7 +3,7 @@ import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { after, test } from "node:test";
 import { join } from "node:path";
-import { CONTROL, DAEMON, PICTURES, SCENE, close, count, findings, loaded, open, page, shown, until,
+import { CONTROL, DAEMON, PICTURES, SCENE, close, count, findings, idle, loaded, open, page, shown, until,
   watched } from "./page.mjs";
 
 after(close);
@@ -97,7 +97,8 @@ test("100 fast changes of method leave no request behind, and end with the right
   await page.keyboard.press("4");
   await until(([from, name]) => told.slice(from).some(t => t.kind === "load" && t.detail.done &&
     t.detail.record.request.technique.name === name), [from, names[3]]);
-  await page.waitForTimeout(300);
+  await page.waitForTimeout(300); // for what should not come
+  await idle();
   const last = await page.evaluate(() => told.findLast(t => t.kind === "load").detail.record.request);
   assert.equal(last.technique.name, names[3]);
   assert.equal(await page.locator("#technique").inputValue(), names[3]);
